@@ -93,7 +93,6 @@ const LONG: &[(&str, usize)] = &[
     ("modules/src/output/way.rs", 438),
     ("modules/tests/launch.rs", 404),
     ("routers/src/outbound/tests/mod.rs", 461),
-    ("routers/src/session/client/mod.rs", 414),
     ("routers/src/time/clock.rs", 420),
     ("routers/src/time/clock/slots.rs", 437),
     ("routers/src/time/election.rs", 408),

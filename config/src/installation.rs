@@ -159,9 +159,10 @@ impl Installation {
         self.network.filter(|_| self.tdma.is_none()).map(|network| network.rest_port())
     }
 
-    /// The UDP port of parts of replicas, if there are any.
+    /// The UDP port of parts of replicas, if any go by the LAN.
     pub fn replica_port(&self) -> Option<u16> {
-        self.network.filter(|_| !self.replicas.is_empty()).map(|network| network.replica_port())
+        let is_any = self.replicas.iter().any(|replica| self.hop_by_lan(replica).is_some());
+        self.network.filter(|_| is_any).map(|network| network.replica_port())
     }
 
     /// A path of the file as the process sees it: relative ones start from the file's folder.

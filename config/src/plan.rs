@@ -24,15 +24,16 @@ pub(crate) fn plan(installation: &Installation, tdma: &Tdma) -> Option<Plan> {
     Some(Plan { link, network, flows, replicas })
 }
 
-/// None if the node that writes it is not on the LAN.
+/// None if no node of the LAN has it from another one.
 fn replicated(installation: &Installation, replica: &Replica) -> Option<PlannedReplica> {
-    let node = installation.lan_index(installation.node_of(replica.from)?)?;
+    let (node, to) = installation.hop_by_lan(replica)?;
+    let (node, receivers) = (installation.lan_index(node)?, to.len() as u32);
     let period = match replica.sampling {
         Sampling::Rate(rate_hz) => Duration::try_from_secs_f64(1.0 / rate_hz).ok(),
         Sampling::Each | Sampling::Every(_) => None,
     };
     let record_bytes = replica.spec(installation).record_bytes;
-    Some(PlannedReplica { node, receivers: replica.to.len() as u32, record_bytes, period })
+    Some(PlannedReplica { node, receivers, record_bytes, period })
 }
 
 /// None if both ends are on one node, or one is not on the LAN.

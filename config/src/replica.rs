@@ -1,7 +1,7 @@
 //! Replicas: streams of a node that other nodes read as if they were written there, `[[replica]]`.
 
 use crate::directory::Directory;
-use crate::node::{Node, Reach};
+use crate::node::Node;
 use crate::reader::{Section, nearest};
 use crate::record::{RecordedItems, Sampling};
 use rohrpost_mailbox::Name;
@@ -87,10 +87,6 @@ fn destinations(section: &Section<'_>, named: &[(&str, usize)], nodes: &[Node]) 
                 let like = like.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
                 report(*line, format!("`{text}` is no node of [nodes]{like}"));
             }
-            Some(node) if node.reach == Reach::Tcp => report(
-                *line,
-                format!("node {text} has `network = \"tcp\"`, and replicas are not carried by TCP yet; drop it"),
-            ),
             Some(_) if to.iter().any(|known| known == text) => {
                 report(*line, format!("node {text} is named twice; drop one"));
             }

@@ -1,9 +1,10 @@
 //! What an installation knows of its replicas.
 
 use crate::installation::Installation;
+use crate::node::Reach;
 use crate::replica::Replica;
 use crate::stream::StreamSpec;
-use rohrpost_mailbox::Name;
+use rohrpost_mailbox::{Name, Priority};
 
 impl Replica {
     /// As the file names the stream.
@@ -11,10 +12,14 @@ impl Replica {
         format!("{}/{}", installation.classes.format(self.from), self.item)
     }
 
-    /// The level on which it leaves: that of the class of the process that writes it.
+    /// The priority with which it leaves: that of the class of the process that writes it.
+    pub fn priority(&self, installation: &Installation) -> Priority {
+        installation.module(self.from).map_or(self.from, |module| module.name).class().priority()
+    }
+
+    /// The level of that on the LAN.
     pub fn level(&self, installation: &Installation) -> u8 {
-        let class = installation.module(self.from).map_or(self.from, |module| module.name).class();
-        installation.network.map_or(0, |network| network.level(class.priority()))
+        installation.network.map_or(0, |network| network.level(self.priority(installation)))
     }
 
     /// The shape that the stream has on each node.
@@ -31,6 +36,33 @@ impl Installation {
             replica.from == from.module() && replica.item == item && replica.to.iter().any(|to| to == node)
         };
         self.replicas.iter().find(is_it)
+    }
+
+    /// The node of the TCP router, if it has a replica by this entry: others may have the stream from there.
+    pub fn tcp_server_with(&self, replica: &Replica) -> Option<&str> {
+        let server = self.tcp.as_ref()?.server.as_deref()?;
+        replica.to.iter().any(|to| to == server).then_some(server)
+    }
+
+    /// By the LAN: from which node to which ones; none if no node of the LAN has it from another one. What is written
+    /// beyond the LAN comes from the TCP router's node.
+    pub fn hop_by_lan<'a>(&'a self, replica: &'a Replica) -> Option<(&'a str, Vec<&'a str>)> {
+        let is_there = |name: &&str| self.lan_index(name).is_some();
+        let writer = self.node_of(replica.from).filter(is_there);
+        let source = writer.or_else(|| self.tcp_server_with(replica).filter(is_there))?;
+        let to = replica.to.iter().map(String::as_str).filter(|to| *to != source && is_there(to));
+        Some((source, to.collect())).filter(|(_, to): &(_, Vec<&str>)| !to.is_empty())
+    }
+
+    /// By the TCP router: from which node to which ones, hop by hop.
+    pub fn hops_by_tcp<'a>(&'a self, replica: &'a Replica) -> Vec<(&'a str, Vec<&'a str>)> {
+        let is_beyond = |name: &&str| self.node(name).is_some_and(|node| node.reach == Reach::Tcp);
+        let Some(server) = self.tcp.as_ref().and_then(|tcp| tcp.server.as_deref()) else { return Vec::new() };
+        let writer = self.node_of(replica.from).unwrap_or_default();
+        let others = replica.to.iter().map(String::as_str).filter(|to| *to != writer && is_beyond(to)).collect();
+        let first = self.tcp_server_with(replica).filter(|_| is_beyond(&writer)).map(|server| (writer, vec![server]));
+        let hops = first.into_iter().chain([(server, others)]);
+        hops.filter(|(_, to): &(&str, Vec<&str>)| !to.is_empty()).collect()
     }
 
     /// What must be equal on all nodes: the place of a replica is its number on the wire.

@@ -4,9 +4,10 @@
 
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use rohrpost_routers::frame::{
-    Alive, Fragment, Frame, FrameHead, FrameKind, RecordPart, Refusal, RefusalReason, ReplicaFrame, VERSION,
+    Alive, DescriptionPart, Fragment, Frame, FrameHead, FrameKind, RecordPart, Refusal, RefusalReason, ReplicaFrame,
+    VERSION,
 };
-use rohrpost_routers::session::frame::HOPS_MAX;
+use rohrpost_routers::session::frame::{HOPS_MAX, SessionFrameHead, SessionMessage};
 use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, HANDSHAKE_MAX_NS};
 use rohrpost_routers::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
 use rohrpost_routers::time::Term;
@@ -16,8 +17,8 @@ const PAGE: &str = include_str!("../../docs/src/wire.md");
 
 /// The bytes of a block: each line begins with pairs of digits, then two spaces and words.
 fn block(name: &str) -> Vec<u8> {
-    let fence = format!("\n```hex datagram-{name}\n");
-    let text = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no ```hex datagram-{name}"));
+    let fence = format!("\n```hex {name}\n");
+    let text = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no ```hex {name}"));
     let lines = text.split("\n```").next().unwrap().lines();
     let pairs = lines.flat_map(|line| line.split("  ").next().unwrap_or_default().split(' '));
     pairs.map(|pair| u8::from_str_radix(pair, 16).unwrap_or_else(|_| panic!("{name}: `{pair}`"))).collect()
@@ -41,7 +42,7 @@ const MOTOR: Name = Name::new(1, 200, 0, 0);
 
 /// Reads a block, and compares it with what is written.
 fn check(name: &str, head: FrameHead, rest: &[u8], read: impl FnOnce(Frame<'_>)) {
-    let there = block(name);
+    let there = block(&format!("datagram-{name}"));
     let (head_there, frame) = Frame::parse(&there).unwrap_or_else(|error| panic!("{name}: {error}"));
     assert_eq!(head_there, head, "{name}");
     read(frame);
@@ -75,25 +76,44 @@ fn a_fragment_has_the_documented_bytes() {
     check("fragment", head, &rest, |frame| assert_eq!(frame, Frame::Fragment(part)));
 }
 
+const STAMP_NS: u64 = 1_700_000_000_000_000_000;
+const PART: RecordPart<'static> = RecordPart {
+    place: 1,
+    generation: 2,
+    description: 0x0102_0304,
+    incarnation: 77,
+    len: 1376,
+    offset: 1372,
+    sequence: 300,
+    epoch: 3,
+    stamp_ns: STAMP_NS,
+    written_ns: STAMP_NS + 100_000,
+    error_ns: 2500,
+    step: 10,
+    sampled: 270,
+    bytes: b"part",
+};
+
+#[test]
+fn parts_of_sessions_have_the_documented_bytes() {
+    let description =
+        DescriptionPart { place: 1, generation: 2, check: 0x0102_0304, len: 2, offset: 0, written: 301, bytes: b"hi" };
+    for (name, message) in [
+        ("session-record-part", SessionMessage::Record(RecordPart { len: 4, offset: 0, ..PART })),
+        ("session-description", SessionMessage::Description(description)),
+    ] {
+        let (there, mut written) = (block(name), Vec::new());
+        message.write(&mut written);
+        assert_eq!(hex(&there), hex(&written), "{name}: left the page, right the code");
+        let (head, rest) = there.split_first_chunk().unwrap();
+        let head = SessionFrameHead::parse(head, rest.len()).unwrap();
+        assert_eq!(SessionMessage::parse(head, rest), Ok(message), "{name}");
+    }
+}
+
 #[test]
 fn a_record_part_has_the_documented_bytes() {
-    const STAMP_NS: u64 = 1_700_000_000_000_000_000;
-    let part = RecordPart {
-        place: 1,
-        generation: 2,
-        description: 0x0102_0304,
-        incarnation: 77,
-        len: 1376,
-        offset: 1372,
-        sequence: 300,
-        epoch: 3,
-        stamp_ns: STAMP_NS,
-        written_ns: STAMP_NS + 100_000,
-        error_ns: 2500,
-        step: 10,
-        sampled: 270,
-        bytes: b"part",
-    };
+    let part = PART;
     let rest = [&part.head_bytes()[..], part.bytes].concat();
     let head = FrameHead { kind: FrameKind::RecordPart, sequence: 12, ..HEAD };
     check("record-part", head, &rest, |frame| assert_eq!(frame, Frame::Replica(ReplicaFrame::Record(part))));

@@ -61,6 +61,7 @@ mod replayed_others;
 mod replicas;
 mod replicas_lossy;
 mod replicas_sealed;
+mod replicas_tcp;
 mod restart;
 mod screen;
 mod seer;

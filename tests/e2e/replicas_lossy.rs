@@ -205,25 +205,25 @@ fn config(place: &Place) -> PathBuf {
 }
 
 /// Whether a record is as it was written.
-type Right = fn(u64, &[u8]) -> bool;
+pub(crate) type Right = fn(u64, &[u8]) -> bool;
 
 /// A reader of a replica, and what it has read.
-struct Follower {
+pub(crate) struct Follower {
     reader: StreamReader,
     is_right: Right,
-    newest: Option<u64>,
-    records: u64,
+    pub(crate) newest: Option<u64>,
+    pub(crate) records: u64,
     lost: u64,
 }
 
 impl Follower {
-    fn new(robot: &Robot, module: &str, is_right: Right) -> Self {
+    pub(crate) fn new(robot: &Robot, module: &str, is_right: Right) -> Self {
         let participant = Participant::join(&robot.node, Name::NONE).unwrap();
         let reader = participant.stream_reader(StreamId { name: robot.name(module), number: NUMBER }).unwrap();
         Self { reader, is_right, newest: None, records: 0, lost: 0 }
     }
 
-    fn follow(&mut self) {
+    pub(crate) fn follow(&mut self) {
         loop {
             match self.reader.try_next().unwrap() {
                 Next::Record(record) => {
@@ -240,16 +240,16 @@ impl Follower {
     }
 
     /// The newest sequence, and how many were read or told as lost.
-    fn told(&self) -> [u64; 2] {
+    pub(crate) fn told(&self) -> [u64; 2] {
         [self.newest.unwrap_or_default(), self.records + self.lost]
     }
 }
 
-fn is_picture(sequence: u64, body: &[u8]) -> bool {
+pub(crate) fn is_picture(sequence: u64, body: &[u8]) -> bool {
     body.ends_with(&pixels(sequence))
 }
 
-fn is_pose(sequence: u64, body: &[u8]) -> bool {
+pub(crate) fn is_pose(sequence: u64, body: &[u8]) -> bool {
     rohrpost::wire::from_bytes::<[u64; 8]>(body).is_ok_and(|pose| pose == [sequence; 8])
 }
 

@@ -99,6 +99,12 @@ fn ask(round: &mut Round, node: String) -> NodeReport {
             Err(failure) => told.failure = told.failure.or(Some(failure)),
         }
     }
+    let has_replicas = !round.running.installation.replicas.is_empty();
+    for end in client.into_iter().chain(server).filter(|_| has_replicas) {
+        // An end without any publishes none.
+        let states = round.newest_of(end, TcpInterface::REPLICAS);
+        states.into_iter().for_each(|(_, states)| told.add_replicas(states));
+    }
     told.clients =
         server.and_then(|server| round.newest_of(server, TcpInterface::CLIENTS).ok()).map(|(_, clients)| clients);
     told

@@ -41,6 +41,17 @@ pub(super) struct Rates {
 }
 
 impl NodeReport {
+    /// Replicas of one more end on this node.
+    pub(super) fn add_replicas(&mut self, states: ReplicaStates) {
+        match &mut self.replicas {
+            Some(all) => {
+                all.sent.extend(states.sent);
+                all.received.extend(states.received);
+            }
+            None => self.replicas = Some(states),
+        }
+    }
+
     /// Whether its routers answer, all its peers are there, and the TCP router is connected.
     pub(super) fn is_well(&self) -> bool {
         let all_alive = |links: &Links| links.peers.iter().all(|peer| peer.state == LinkState::Alive);

@@ -5,7 +5,7 @@ pub(super) mod faults;
 mod flows;
 pub(crate) mod keys;
 mod links;
-mod replicas;
+pub(crate) mod replicas;
 mod slots;
 
 use crate::terminal::Failure;
@@ -106,7 +106,9 @@ impl Module for RouterModule {
         }
         let flows = flows::of(&self.shell, &context.installation().classes);
         context.publish_now(RouterInterface::FLOWS, &flows)?;
-        if let Some(states) = replicas::of(&self.shell, context.installation(), &self.replicas) {
+        let installation = context.installation();
+        let node = installation.node_of(context.me()).unwrap_or_default();
+        if let Some(states) = replicas::of(node, self.shell.replicas(), installation, &self.replicas) {
             context.publish_now(RouterInterface::REPLICAS, &states)?;
         }
         Ok(())

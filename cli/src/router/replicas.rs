@@ -4,12 +4,11 @@ use rohrpost::interfaces::{ReplicaCause, ReplicaState, ReplicaStates};
 use rohrpost::schema::Description;
 use rohrpost_config::Installation;
 use rohrpost_routers::frame::NodeIndex;
-use rohrpost_routers::replication::{Describe, ReplicaLoss, ReplicaLosses, ReplicaSettings};
-use rohrpost_routers::shell::Shell;
+use rohrpost_routers::replication::{Describe, ReplicaCounts, ReplicaLoss, ReplicaLosses, ReplicaSettings};
 use std::time::Duration;
 
 /// Reads descriptions of modules.
-pub(super) struct Descriptions;
+pub(crate) struct Descriptions;
 
 impl Describe for Descriptions {
     fn number(&self, description: &[u8], item: &str) -> Option<u16> {
@@ -18,14 +17,18 @@ impl Describe for Descriptions {
     }
 }
 
-/// The present state; none on a node that sends and has no replica.
-pub(super) fn of(shell: &Shell, installation: &Installation, all: &[ReplicaSettings]) -> Option<ReplicaStates> {
-    let (settings, counts) = (shell.settings(), shell.replicas());
-    let node = |index: NodeIndex| settings.nodes.get(usize::from(index)).map(|node| node.name.clone());
+/// The present state on a node; none if it sends and has no replica. `all` is what `received` has the places of.
+pub(crate) fn of(
+    node: &str,
+    counts: &ReplicaCounts,
+    installation: &Installation,
+    all: &[ReplicaSettings],
+) -> Option<ReplicaStates> {
+    let name = |index: NodeIndex| installation.nodes.get(usize::from(index)).map(|node| node.name.clone());
     let stream = |place: u16| installation.replicas.get(usize::from(place)).map(|replica| replica.text(installation));
     let sent = counts.sent.iter().map(|sent| ReplicaState {
         stream: stream(sent.place).unwrap_or_default(),
-        node: node(sent.to).unwrap_or_default(),
+        node: name(sent.to).unwrap_or_default(),
         records: sent.records.get(),
         bytes: sent.bytes.get(),
         gaps: None,
@@ -43,7 +46,7 @@ pub(super) fn of(shell: &Shell, installation: &Installation, all: &[ReplicaSetti
         let p99 = delay.quantile(0.99);
         ReplicaState {
             stream: stream(received.place).unwrap_or_default(),
-            node: all.get(usize::from(received.place)).and_then(|replica| node(replica.node)).unwrap_or_default(),
+            node: all.get(usize::from(received.place)).and_then(|replica| name(replica.node)).unwrap_or_default(),
             records: received.records.get(),
             bytes: received.bytes.get(),
             gaps: Some(received.gaps.get()),
@@ -57,11 +60,7 @@ pub(super) fn of(shell: &Shell, installation: &Installation, all: &[ReplicaSetti
         }
     });
     let is_any = !counts.sent.is_empty() || !counts.received.is_empty();
-    is_any.then(|| ReplicaStates {
-        node: node(settings.own).unwrap_or_default(),
-        sent: sent.collect(),
-        received: received.collect(),
-    })
+    is_any.then(|| ReplicaStates { node: node.into(), sent: sent.collect(), received: received.collect() })
 }
 
 fn causes(lost: &ReplicaLosses) -> Vec<ReplicaCause> {

@@ -1,6 +1,6 @@
 //! A node's client of the TCP router, as a module.
 
-use super::ends::{PERIOD, called, certificates, classes, configured, levels};
+use super::ends::{PERIOD, called, certificates, classes, configured, levels, line_parts, replicas};
 use crate::router::{NoSettings, faults::Encoded, impairment};
 use rohrpost::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
 use rohrpost::{Context, Module, ModuleError};
@@ -68,6 +68,8 @@ impl Module for ClientModule {
             seal,
             keeps_time: is_beyond,
             impair,
+            // The TCP router itself has those of its node.
+            replicas: if is_beyond { line_parts(installation, &node_name) } else { None },
         })?;
         context.use_computer_clock();
         context.set_period(PERIOD);
@@ -105,6 +107,9 @@ impl Module for ClientModule {
                 received: classes(&link.inn),
             },
         )?;
+        if let Some(states) = replicas(context.installation(), &self.node, self.shell.replicas()) {
+            context.publish_now(TcpInterface::REPLICAS, &states)?;
+        }
         Ok(())
     }
 }

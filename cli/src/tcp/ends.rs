@@ -1,11 +1,14 @@
 //! Code that the modules of the TCP router and of its clients share.
 
+use crate::router::replicas::{Descriptions, of};
 use rohrpost::ModuleError;
-use rohrpost::interfaces::{CarriedLoss, ClassPassed};
+use rohrpost::interfaces::{CarriedLoss, ClassPassed, ReplicaStates};
 use rohrpost_config::{Installation, Tcp};
 use rohrpost_mailbox::Priority;
-use rohrpost_routers::tcp::Class;
+use rohrpost_routers::replication::LineSettings;
+use rohrpost_routers::tcp::{Class, LineCounts, LineParts};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// How often they publish their state.
@@ -24,6 +27,18 @@ pub(super) fn certificates(installation: &Installation, tcp: &Tcp) -> Option<Pat
         tracing::warn!("{}", Tcp::UNPROTECTED);
     }
     tcp.certificates.as_ref().map(|folder| installation.resolve(folder))
+}
+
+/// The replicas of a node that go by the TCP router, if there are any.
+pub(super) fn line_parts(installation: &Installation, node: &str) -> Option<LineParts> {
+    let settings = LineSettings::new(installation, node)?;
+    Some(LineParts { settings, describe: Arc::new(Descriptions) })
+}
+
+/// How they stand.
+pub(super) fn replicas(installation: &Installation, node: &str, counts: &LineCounts) -> Option<ReplicaStates> {
+    let settings = LineSettings::new(installation, node)?;
+    of(node, &counts.replicas, installation, &settings.received)
 }
 
 /// The level of each priority.

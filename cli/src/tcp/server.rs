@@ -1,6 +1,6 @@
 //! The TCP router, as a module.
 
-use super::ends::{PERIOD, called, certificates, classes, configured, levels, short};
+use super::ends::{PERIOD, called, certificates, classes, configured, levels, line_parts, replicas, short};
 use crate::router::{NoSettings, faults::Encoded};
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, Tcp, TcpInterface};
 use rohrpost::{Context, Module, ModuleError, Name};
@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 pub(super) struct ServerModule {
     shell: ServerShell,
+    node: String,
     address: SocketAddr,
     began_ns: u64,
 }
@@ -54,10 +55,12 @@ impl Module for ServerModule {
         let address = tcp.address;
         let faults = Arc::new(Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
-        let shell = ServerShell::start(ServerParts { address, settings, faults, seal, names, node: &node })?;
+        let own = installation.node_of(context.me()).unwrap_or_default().to_owned();
+        let replicas = line_parts(installation, &own);
+        let shell = ServerShell::start(ServerParts { address, settings, faults, seal, names, node: &node, replicas })?;
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { shell, address, began_ns: monotonic_ns() })
+        Ok(Self { shell, node: own, address, began_ns: monotonic_ns() })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -83,9 +86,13 @@ impl Module for ServerModule {
                 },
                 superseded: seen.superseded,
                 held_lines: seen.held,
+                unknown_parts: self.shell.replicas().unknown.get(),
                 classes: classes(&seen.classes),
             },
         )?;
+        if let Some(states) = replicas(context.installation(), &self.node, self.shell.replicas()) {
+            context.publish_now(TcpInterface::REPLICAS, &states)?;
+        }
         Ok(())
     }
 }
@@ -149,6 +156,7 @@ mod tests {
         let lost = Cause::ALL.map(|cause| CarriedLoss { cause: cause.word().into(), packages: most });
         let class = ClassPassed { class: u8::MAX, packages: most, passed: most, replaced: most, lost: lost.into() };
         let all = BeyondClients {
+            unknown_parts: most,
             address: client.address.clone(),
             uptime_ms: most,
             clients: vec![client; MEMBERS_MAX],

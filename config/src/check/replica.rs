@@ -4,6 +4,7 @@ use crate::installation::Installation;
 use crate::node::Reach;
 use crate::reader::Reader;
 use crate::replica::{REPLICAS_MAX, Replica};
+use crate::stream::StreamSpec;
 use crate::units::size_text;
 
 /// With time slots records are compared in the slot of their node: a larger one would take a part of it.
@@ -22,14 +23,22 @@ pub(super) fn validate(installation: &Installation, reader: &Reader<'_>) {
         if replica.to.contains(&writer.node) {
             report(format!("node {} writes this stream itself; drop the node from `to`", writer.node));
         }
-        if installation.node(&writer.node).is_some_and(|node| node.reach == Reach::Tcp) {
-            report(format!(
-                "node {}, which writes it, has `network = \"tcp\"`, and replicas are not carried by TCP yet; drop the \
-                 replica",
-                writer.node
-            ));
+        if let Some(missing) = missing_hop(installation, replica, &writer.node) {
+            report(missing);
         }
-        let record_bytes = replica.spec(installation).record_bytes;
+        let StreamSpec { record_bytes, readers, .. } = replica.spec(installation);
+        for (node, to) in installation.hops_by_tcp(replica) {
+            let by_lan = installation.hop_by_lan(replica).is_some_and(|(source, _)| source == node);
+            let routers = to.len() + usize::from(by_lan);
+            if routers > usize::from(readers) {
+                report(format!(
+                    "on node {node} routers are {routers} of its readers, one for each node that has it by TCP, and it \
+                     has {readers}; write `readers = {}` or more in [module.stream.{}]",
+                    routers + 1,
+                    replica.item
+                ));
+            }
+        }
         if replica.changed && installation.tdma.is_some() && record_bytes > COMPARED_IN_SLOT_BYTES_MAX {
             report(format!(
                 "with time slots records are compared in the slot of their node, and those of {} take too long; drop \
@@ -43,4 +52,20 @@ pub(super) fn validate(installation: &Installation, reader: &Reader<'_>) {
             report(format!("`{text}` is in line {} already; name all its nodes there, and drop this one", first.line));
         }
     }
+}
+
+/// What is wrong with a replica that goes by the TCP router: that carries what its own node has.
+fn missing_hop(installation: &Installation, replica: &Replica, writer: &str) -> Option<String> {
+    let is_beyond = |name: &str| installation.node(name).is_some_and(|node| node.reach == Reach::Tcp);
+    let mut others = std::iter::once(writer).chain(replica.to.iter().map(String::as_str));
+    let beyond = others.find(|name| is_beyond(name))?;
+    // That it runs on a node of the file is validated with the nodes.
+    let server = installation.tcp.as_ref()?.server.as_deref()?;
+    if writer == server || installation.tcp_server_with(replica).is_some() {
+        return None;
+    }
+    Some(format!(
+        "node {beyond} has `network = \"tcp\"`, and the TCP router carries the streams that its own node has; add \
+         \"{server}\" to `to`"
+    ))
 }

@@ -3,7 +3,7 @@
 use super::Page;
 use crate::output::Level;
 use crate::record::{RecordedItems, Sampling};
-use crate::units::{duration_text, size_text};
+use crate::units::{duration_text, size_about, size_text};
 use std::time::Duration;
 
 impl Page<'_> {
@@ -63,12 +63,12 @@ impl Page<'_> {
         for replica in &self.installation.replicas {
             let node = self.installation.node_of(replica.from).unwrap_or_default();
             let asks = match replica.deadline {
-                Duration::ZERO => "not asked for".into(),
-                deadline => format!("asked for during {}", duration_text(deadline)),
+                Duration::ZERO => "; what is lost is not asked for".into(),
+                deadline => format!("; what is lost is asked for during {}", duration_text(deadline)),
             };
+            let asks = self.installation.hop_by_lan(replica).map_or_else(String::new, |_| asks);
             let words = format!(
-                "{} of node {node} to {}: {} of its records{}, each of at most {}; told if later than {}; what is lost \
-                 is {asks}",
+                "{} of node {node} to {}: {} of its records{}, each of at most {}; told if later than {}{asks}",
                 replica.text(self.installation),
                 replica.to.join(", "),
                 replica.sampling,
@@ -77,6 +77,21 @@ impl Page<'_> {
                 duration_text(replica.delay_alarm)
             );
             self.entry("sends", &words);
+            for (node, to) in self.installation.hops_by_tcp(replica) {
+                let bytes = u64::from(replica.spec(self.installation).record_bytes);
+                let load = match replica.sampling {
+                    Sampling::Rate(rate_hz) => {
+                        format!("; up to {} a second to each", size_about((bytes as f64 * rate_hz) as u64))
+                    }
+                    Sampling::Each | Sampling::Every(_) => String::new(),
+                };
+                let words = format!(
+                    "from {node} to {}, as fast as the line of each takes it: one record at a time, then the \
+                     newest{load}",
+                    to.join(", ")
+                );
+                self.entry("by TCP", &words);
+            }
         }
     }
 

@@ -1,5 +1,7 @@
 //! The reading side of a stream: records copied out, or read in place.
 
+mod kept;
+
 use crate::participant::Participant;
 use crate::stream::error::StreamError;
 use crate::stream::lookup::{self, Answer};
@@ -23,6 +25,8 @@ pub struct StreamReader {
     lost: u64,
     missed: MissedAccount,
     eager: bool,
+    /// The record that stays held: the seat names its frame.
+    kept: Option<Line>,
 }
 
 impl Participant {
@@ -34,8 +38,8 @@ impl Participant {
     pub fn stream_reader(self: &Arc<Self>, id: StreamId) -> Result<StreamReader, StreamError> {
         let participant = self.clone();
         let (next, read, lost, missed) = (0, 0, 0, MissedAccount::default());
-        let (place, registry_epoch, eager) = (None, None, false);
-        let mut reader = StreamReader { participant, id, place, registry_epoch, next, read, lost, missed, eager };
+        let (place, registry_epoch, eager, kept) = (None, None, false, None);
+        let mut reader = StreamReader { participant, id, place, registry_epoch, next, read, lost, missed, eager, kept };
         reader.follow()?;
         reader.go_to(reader.ring().map_or(0, |ring| ring.written()));
         Ok(reader)
@@ -135,6 +139,7 @@ impl StreamReader {
     /// # Errors
     /// When the stream was replaced or made, and cannot be opened. What was read before stays read.
     pub fn try_next(&mut self) -> Result<Next<HeldRecord<'_>>, StreamError> {
+        self.let_go();
         let next = self.advance(|place, line| place.ring().hold(place.seat, line))?;
         Ok(self.held(next))
     }
@@ -144,6 +149,7 @@ impl StreamReader {
     /// # Errors
     /// As for [`StreamReader::try_next`].
     pub fn try_next_into(&mut self, body: &mut Vec<u8>) -> Result<Next<RecordInfo>, StreamError> {
+        self.let_go();
         let next = self.advance(|place, line| place.segment.copy(place.seat, line, body))?;
         Ok(self.told(next))
     }
@@ -154,6 +160,7 @@ impl StreamReader {
     /// # Errors
     /// As for [`StreamReader::try_next`].
     pub fn next_timeout(&mut self, waiting: impl Into<Waiting>) -> Result<Next<HeldRecord<'_>>, StreamError> {
+        self.let_go();
         let next = self.await_next(waiting.into(), |place, line| place.ring().hold(place.seat, line))?;
         Ok(self.held(next))
     }
@@ -167,6 +174,7 @@ impl StreamReader {
         body: &mut Vec<u8>,
         waiting: impl Into<Waiting>,
     ) -> Result<Next<RecordInfo>, StreamError> {
+        self.let_go();
         let next = self.await_next(waiting.into(), |place, line| place.segment.copy(place.seat, line, body))?;
         Ok(self.told(next))
     }
@@ -177,6 +185,7 @@ impl StreamReader {
     /// # Errors
     /// As for [`StreamReader::try_next`].
     pub fn newest(&mut self) -> Result<Option<HeldRecord<'_>>, StreamError> {
+        self.let_go();
         let line = self.take_newest(|place, line| place.ring().hold(place.seat, line))?;
         Ok(line.and_then(|line| self.hand_out(line)))
     }
@@ -186,19 +195,14 @@ impl StreamReader {
     /// # Errors
     /// As for [`StreamReader::try_next`].
     pub fn newest_into(&mut self, body: &mut Vec<u8>) -> Result<Option<RecordInfo>, StreamError> {
+        self.let_go();
         let line = self.take_newest(|place, line| place.segment.copy(place.seat, line, body))?;
         Ok(line.and_then(|line| Some(self.place.as_ref()?.info(&line))))
     }
 
-    /// The record of this sequence, to read in place; none when it is there no more, or not yet. The position stays.
-    pub fn record(&mut self, sequence: u64) -> Option<HeldRecord<'_>> {
-        let place = self.place.as_ref()?;
-        let Look::There(line) = place.ring().look(sequence) else { return None };
-        if place.ring().hold(place.seat, &line) { self.hand_out(line) } else { None }
-    }
-
-    /// The same, copied into `body`, which is cleared first.
+    /// What [`StreamReader::record`] hands out, copied into `body`, which is cleared first.
     pub fn record_into(&mut self, sequence: u64, body: &mut Vec<u8>) -> Option<RecordInfo> {
+        self.let_go();
         let place = self.place.as_ref()?;
         let Look::There(line) = place.ring().look(sequence) else { return None };
         place.segment.copy(place.seat, &line, body).then(|| place.info(&line))
@@ -284,12 +288,12 @@ impl StreamReader {
 
     /// A record that is held since just now.
     fn hand_out(&self, line: Line) -> Option<HeldRecord<'_>> {
-        self.place.as_ref().map(|place| HeldRecord { place, line })
+        self.place.as_ref().map(|place| HeldRecord { place, line, is_kept: false })
     }
 
     fn held(&self, next: Next<Line>) -> Next<HeldRecord<'_>> {
         match (next, &self.place) {
-            (Next::Record(line), Some(place)) => Next::Record(HeldRecord { place, line }),
+            (Next::Record(line), Some(place)) => Next::Record(HeldRecord { place, line, is_kept: false }),
             (Next::Lost(lost), _) => Next::Lost(lost),
             _ => Next::Nothing,
         }
@@ -330,7 +334,8 @@ impl StreamReader {
         let is_anew = self.place.as_ref().is_some_and(|old| place.ring().first() < old.ring().written());
         let is_first = self.place.is_none() && self.next == 0 && place.segment.is_replica();
         let next = if is_anew || is_first { place.ring().first() } else { self.next };
-        self.place = Some(place);
+        // The seat that held it is left.
+        (self.place, self.kept) = (Some(place), None);
         self.go_to(next);
         Ok(true)
     }

@@ -142,6 +142,8 @@ impl TakenSeat {
 pub struct HeldRecord<'a> {
     pub(super) place: &'a TakenSeat,
     pub(super) line: Line,
+    /// It stays held, for its reader.
+    pub(super) is_kept: bool,
 }
 
 impl HeldRecord<'_> {
@@ -158,6 +160,8 @@ impl HeldRecord<'_> {
 
 impl Drop for HeldRecord<'_> {
     fn drop(&mut self) {
-        self.place.ring().release(self.place.seat);
+        if !self.is_kept {
+            self.place.ring().release(self.place.seat);
+        }
     }
 }

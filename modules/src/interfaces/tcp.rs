@@ -1,6 +1,6 @@
 //! What is beyond the LAN, seen by tools: the TCP router, and a node's client of it.
 
-use super::router::CarriedLoss;
+use super::router::{CarriedLoss, ReplicaStates};
 use crate::interface;
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -172,6 +172,9 @@ pub struct BeyondClients {
     /// Lines of output that were only counted, since there were too many of their cause.
     #[schema(unit = "lines")]
     pub held_lines: u64,
+    /// Parts of replicas that this node has not, from any client.
+    #[schema(unit = "parts")]
+    pub unknown_parts: u64,
     /// Classes of which something passed, the most urgent first.
     pub classes: Vec<ClassPassed>,
 }
@@ -210,4 +213,8 @@ pub trait Tcp {
     /// Which names are registered at the TCP router, and by which host.
     #[data(3)]
     fn hosts() -> BeyondHosts;
+
+    /// What this end carries of streams, where there are replicas by the TCP router.
+    #[data(4)]
+    fn replicas() -> ReplicaStates;
 }

@@ -87,7 +87,7 @@ impl<'a> RecordPart<'a> {
         bytes
     }
 
-    pub(super) fn parse(rest: &'a [u8]) -> Result<Self, BadFrame> {
+    pub(crate) fn parse(rest: &'a [u8]) -> Result<Self, BadFrame> {
         let Some((b, bytes)) = rest.split_first_chunk::<RECORD_PART_HEAD_BYTES>() else {
             return Err(BadFrame::Damaged("a part of a record is cut short"));
         };
@@ -148,7 +148,7 @@ impl<'a> DescriptionPart<'a> {
         bytes
     }
 
-    pub(super) fn parse(rest: &'a [u8]) -> Result<Self, BadFrame> {
+    pub(crate) fn parse(rest: &'a [u8]) -> Result<Self, BadFrame> {
         let Some((b, bytes)) = rest.split_first_chunk::<DESCRIPTION_PART_HEAD_BYTES>() else {
             return Err(BadFrame::Damaged("a part of a description is cut short"));
         };

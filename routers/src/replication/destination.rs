@@ -19,6 +19,9 @@ const ASKED_MAX: usize = 32;
 pub(super) struct Destination {
     pub(super) peer: NodeIndex,
     pub(super) counts: Arc<SentReplica>,
+    /// It is reached by a line on which nothing is lost, and which may be slow: a record is held until all of it left,
+    /// and then the newest is next.
+    pub(super) by_line: bool,
     /// Incarnation of its router that was last seen.
     pub(super) incarnation: u64,
     /// Sequence of its next record; none: the newest.
@@ -56,6 +59,7 @@ impl Destination {
         Self {
             peer,
             counts: Arc::new(SentReplica::new(place, peer)),
+            by_line: false,
             incarnation: 0,
             next: None,
             is_absent: true,
@@ -73,6 +77,11 @@ impl Destination {
         }
     }
 
+    /// The same by a line.
+    pub(super) fn by_line(self) -> Self {
+        Self { by_line: true, ..self }
+    }
+
     /// Whether a record is under way; if none is, takes the next. `fingerprints`: only of those that changed.
     pub(super) fn begin(
         &mut self,
@@ -83,14 +92,20 @@ impl Destination {
     ) -> bool {
         let Some(keep) = reader.shape().map(|shape| u64::from(shape.keep)) else { return false };
         let (lost, mut next) = (&self.counts.lost, self.next.unwrap_or(newest.sequence));
-        if self.under_way.is_none() && newest.sequence.saturating_sub(next) >= keep / 2 {
+        let behind_max = if self.by_line { 1 } else { keep / 2 };
+        let waits = matches!(sampling, Sampling::Rate(_)) && now_ns < self.sample_ns && !self.has_none;
+        if self.under_way.is_none() && newest.sequence.saturating_sub(next) >= behind_max && !waits {
             // Of one in so many: the newest of them.
-            let behind = match sampling {
-                Sampling::Every(every) if !self.has_none => newest.sequence % u64::from(every.max(1)),
-                _ => 0,
+            let every = match sampling {
+                Sampling::Every(every) if !self.has_none => u64::from(every.max(1)),
+                _ => 1,
             };
-            let newest = (newest.sequence - behind).max(next);
-            lost.add(ReplicaLoss::Passed, newest - next);
+            let newest = (newest.sequence - newest.sequence % every).max(next);
+            let passed = newest.div_ceil(every) - next.div_ceil(every);
+            lost.add(ReplicaLoss::Passed, passed);
+            let sampled = newest - next - passed;
+            lost.add(ReplicaLoss::Sampled, sampled);
+            self.sampled = self.sampled.wrapping_add(sampled as u32);
             next = newest;
         }
         while self.under_way.is_none() && next <= newest.sequence {
@@ -107,7 +122,8 @@ impl Destination {
                 self.sampled = self.sampled.wrapping_add(1);
                 continue;
             }
-            let Some(record) = reader.record(sequence) else {
+            let is_there = !self.by_line || reader.keep(sequence).is_some();
+            let Some(record) = reader.record(sequence).filter(|_| is_there) else {
                 lost.add(ReplicaLoss::Passed, 1);
                 continue;
             };

@@ -131,8 +131,13 @@ impl IncomingReplica {
 
     /// Its ring is left as it is, and opened again when a record comes.
     pub(super) fn forget(&mut self) {
-        [OLDER, NEWER].into_iter().for_each(|at| self.give_up(at));
+        self.cut();
         (self.writer, self.known) = (None, None);
+    }
+
+    /// What is open is given up.
+    pub(super) fn cut(&mut self) {
+        [OLDER, NEWER].into_iter().for_each(|at| self.give_up(at));
     }
 
     /// Takes a part.

@@ -31,6 +31,7 @@
 
 mod again;
 mod answer_time;
+mod by_level;
 mod counts;
 mod delay;
 mod description;
@@ -38,7 +39,9 @@ mod destination;
 mod fingerprint;
 mod gathering;
 mod incoming;
+mod line;
 mod outgoing;
+mod peers;
 mod receiving;
 mod requests;
 mod sending;
@@ -47,16 +50,24 @@ mod settings;
 mod tests;
 
 pub use counts::{ReceivedReplica, ReplicaCounts, ReplicaLoss, ReplicaLosses, SentReplica};
+pub use line::{LineReplicas, TellsTime};
 pub use receiving::ReplicaReceiver;
 pub use requests::PartRequests;
 pub use sending::{ReplicaSender, ReplicaStep};
-pub use settings::ReplicaSettings;
+pub use settings::{LineSettings, ReplicaSettings};
 
 use crate::frame::{self, RECORD_PART_HEAD_BYTES};
 use crate::settings::Settings;
 
 /// Descriptions are sent this often to each node that has a replica.
 pub const DESCRIBE_EVERY_NS: u64 = 1_000_000_000;
+
+/// Bytes of each part of a record but the last. An important package waits for no more than one part that is ready.
+pub const LINE_PART_BYTES: usize = 4096;
+/// A part with its head, at most.
+pub const LINE_PART_ROOM: usize = RECORD_PART_HEAD_BYTES + LINE_PART_BYTES;
+/// Descriptions are sent when a node comes and when they change; and this often, if the other end could not use one.
+const LINE_DESCRIBE_EVERY_NS: u64 = 10_000_000_000;
 
 /// Reads what this crate does not know.
 pub trait Describe: Send + Sync {

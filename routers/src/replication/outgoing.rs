@@ -4,11 +4,10 @@ use super::counts::ReplicaLoss;
 use super::description::OwnDescription;
 use super::destination::Destination;
 use super::fingerprint::Fingerprints;
+use super::peers::Peers;
 use super::settings::ReplicaSettings;
-use super::{DESCRIBE_EVERY_NS, Describe, part_bytes};
+use super::{DESCRIBE_EVERY_NS, Describe, LINE_DESCRIBE_EVERY_NS, LINE_PART_BYTES};
 use crate::frame::{DESCRIPTION_BYTES_MAX, FrameKind, NodeIndex, PartRequest, RECORD_PART_HEAD_BYTES, RecordPart};
-use crate::outbound::Outbound;
-use crate::settings::Settings;
 use rohrpost_mailbox::{Participant, RecordInfo, StreamId, StreamReader, SystemTime};
 use std::sync::Arc;
 
@@ -17,6 +16,7 @@ pub(super) struct OutgoingReplica {
     pub(super) settings: ReplicaSettings,
     /// Of the module that writes it.
     description: OwnDescription,
+    describe_every_ns: u64,
     pub(super) reader: Option<StreamReader>,
     /// How often the stream was made anew.
     generation: u16,
@@ -34,11 +34,18 @@ pub(super) struct OutgoingReplica {
 }
 
 impl OutgoingReplica {
-    pub(super) fn new(place: u16, replica: &ReplicaSettings, settings: &Settings) -> Self {
-        let peers = settings.peers().filter(|peer| replica.to & 1 << peer != 0);
-        let parts = (replica.shape.record_bytes as usize).div_ceil(part_bytes(settings));
+    /// For those of `peers` that have it.
+    pub(super) fn new(
+        place: u16,
+        replica: &ReplicaSettings,
+        peers: impl Iterator<Item = NodeIndex>,
+        part_bytes: usize,
+    ) -> Self {
+        let peers = peers.filter(|peer| replica.to & 1 << peer != 0);
+        let parts = (replica.shape.record_bytes as usize).div_ceil(part_bytes);
         Self {
             place,
+            describe_every_ns: DESCRIBE_EVERY_NS,
             destinations: peers.map(|peer| Destination::new(place, peer, parts)).collect(),
             fingerprints: replica.changed.then(Fingerprints::default),
             settings: replica.clone(),
@@ -50,6 +57,13 @@ impl OutgoingReplica {
             turn: 0,
             told: false,
         }
+    }
+
+    /// For one node, by a line on which nothing is lost: records are held there until they have left.
+    pub(super) fn by_line(place: u16, replica: &ReplicaSettings, peer: NodeIndex) -> Self {
+        let made = Self::new(place, replica, std::iter::once(peer), LINE_PART_BYTES);
+        let destinations = made.destinations.into_iter().map(Destination::by_line).collect();
+        Self { describe_every_ns: LINE_DESCRIBE_EVERY_NS, destinations, ..made }
     }
 
     pub(super) fn look(&mut self, participant: &Arc<Participant>, describe: &dyn Describe) {
@@ -96,8 +110,7 @@ impl OutgoingReplica {
 
     fn note_newest(&mut self) {
         let Some(reader) = &mut self.reader else { return };
-        let newest = reader.newest().map(|newest| newest.map(|record| record.info()));
-        let newest = match newest {
+        let newest = match reader.newest_info() {
             Ok(newest) => newest,
             Err(error) => {
                 // It is opened anew at the next look.
@@ -120,10 +133,10 @@ impl OutgoingReplica {
     }
 
     /// Takes notice of nodes that have come, were restarted, or are gone.
-    pub(super) fn meet(&mut self, now_ns: u64, outbound: &Outbound) {
+    pub(super) fn meet(&mut self, now_ns: u64, peers: &impl Peers) {
         let Self { reader, newest, destinations, .. } = self;
         for destination in destinations {
-            let incarnation = outbound.incarnation_of(destination.peer);
+            let incarnation = peers.incarnation_of(destination.peer);
             if std::mem::replace(&mut destination.incarnation, incarnation) != incarnation {
                 // It may have nothing: the description and the newest record go to it at once.
                 (destination.describe_ns, destination.describing) = (0, None);
@@ -133,7 +146,7 @@ impl OutgoingReplica {
                 destination.next = destination.next.zip(again).map(|(next, again)| next.min(again));
                 destination.has_none = true;
             }
-            if !outbound.is_there(now_ns, destination.peer) {
+            if !peers.is_there(now_ns, destination.peer) {
                 destination.pass_over(newest.as_ref());
                 continue;
             }
@@ -141,6 +154,15 @@ impl OutgoingReplica {
             if now_ns >= destination.describe_ns && destination.describing.is_none() && reader.is_some() {
                 destination.describing = Some(0);
             }
+        }
+        self.let_go();
+    }
+
+    /// What was held for a line, and is under way no more.
+    fn let_go(&mut self) {
+        let is_held = |destination: &Destination| destination.by_line && destination.under_way.is_some();
+        if !self.destinations.iter().any(is_held) {
+            self.reader.iter_mut().for_each(StreamReader::let_go);
         }
     }
 
@@ -246,7 +268,7 @@ impl OutgoingReplica {
         let (bytes, end) = self.description.write((place, generation, written), offset, content);
         let destination = &mut self.destinations[to];
         destination.describing = end;
-        destination.describe_ns = now_ns + DESCRIBE_EVERY_NS;
+        destination.describe_ns = now_ns + self.describe_every_ns;
         bytes
     }
 }

@@ -9,8 +9,8 @@ use super::gathering::Life;
 use super::incoming::{IncomingReplica, Now};
 use super::requests::{IncomingRequests, PartRequests, RequestFate};
 use super::settings::ReplicaSettings;
-use super::{Describe, part_bytes};
-use crate::frame::{DescriptionPart, FrameHead, ReplicaFrame};
+use super::{Describe, LINE_PART_BYTES, part_bytes};
+use crate::frame::{DescriptionPart, FrameHead, NodeIndex, ReplicaFrame};
 use crate::settings::Settings;
 use rohrpost_mailbox::{Name, NodeError, Participant, StreamId, SystemTime};
 use std::sync::Arc;
@@ -41,9 +41,27 @@ impl ReplicaReceiver {
         participant: Arc<Participant>,
         describe: Arc<dyn Describe>,
     ) -> Self {
-        let part_bytes = part_bytes(settings);
+        Self::of((settings.own, part_bytes(settings)), replicas, participant, describe)
+    }
+
+    /// The same of those that come by sessions.
+    pub(super) fn of_line(
+        own: NodeIndex,
+        replicas: &[ReplicaSettings],
+        participant: Arc<Participant>,
+        describe: Arc<dyn Describe>,
+    ) -> Self {
+        Self::of((own, LINE_PART_BYTES), replicas, participant, describe)
+    }
+
+    fn of(
+        (own, part_bytes): (NodeIndex, usize),
+        replicas: &[ReplicaSettings],
+        participant: Arc<Participant>,
+        describe: Arc<dyn Describe>,
+    ) -> Self {
         let incoming = |(place, replica): (u16, &ReplicaSettings)| {
-            let is_here = replica.to & 1 << settings.own != 0 && replica.node != settings.own;
+            let is_here = replica.to & 1 << own != 0 && replica.node != own;
             is_here.then(|| IncomingReplica::new(place, replica, part_bytes))
         };
         let streams = (0..).zip(replicas).map(incoming).collect();
@@ -76,29 +94,46 @@ impl ReplicaReceiver {
         head: &FrameHead,
         frame: &ReplicaFrame<'_>,
     ) -> bool {
+        self.take_from(now_ns, system, (head.from, head.incarnation), frame)
+    }
+
+    /// The same of a router in this life.
+    pub(super) fn take_from(
+        &mut self,
+        now_ns: u64,
+        system: impl Fn() -> SystemTime,
+        (from, router): (NodeIndex, u64),
+        frame: &ReplicaFrame<'_>,
+    ) -> bool {
         if let ReplicaFrame::Request(request) = frame {
             let Some(requests) = &mut self.requests else { return false };
-            let fate = requests.came(head.from, request);
+            let fate = requests.came(from, request);
             self.rings |= fate == RequestFate::Waits;
             return fate != RequestFate::Refused;
         }
         let Some(Some(stream)) = self.streams.get_mut(usize::from(frame.place())) else { return false };
-        if stream.settings.node != head.from {
+        if stream.settings.node != from {
             stream.lose(ReplicaLoss::Foreign);
             return true;
         }
         match frame {
             ReplicaFrame::Record(part) => {
-                let life = Life { router: head.incarnation, generation: part.generation };
+                let life = Life { router, generation: part.generation };
                 let now = Now { ns: now_ns, participant: &self.participant, system: &system };
                 stream.take(now, life, part);
                 self.waits |= stream.waits(now_ns);
                 self.rings |= std::mem::take(&mut stream.has_asked);
             }
-            ReplicaFrame::Description(part) => self.describe(head.incarnation, part),
+            ReplicaFrame::Description(part) => self.describe(router, part),
             ReplicaFrame::Request(_) => {}
         }
         true
+    }
+
+    /// The connection to a node is over: nothing more comes of what is open.
+    pub(super) fn cut(&mut self, from: NodeIndex) {
+        let all = self.streams.iter_mut().flatten().filter(|stream| stream.settings.node == from);
+        all.for_each(IncomingReplica::cut);
     }
 
     /// Does what time alone makes due. Says whether it waits for parts: then call it again within milliseconds, though

@@ -5,6 +5,7 @@
 //! overwritten on their way. What such a node asks for again goes before what is new to it. Requests of this node for
 //! parts of others leave here as well, each at the level of its stream, and before parts of that level.
 
+use super::by_level::StreamsByLevel;
 use super::counts::SentReplica;
 use super::outgoing::OutgoingReplica;
 use super::requests::{PartRequests, RequestPlan, SentRequests};
@@ -14,7 +15,6 @@ use crate::frame::{self, NodeIndex, RECORD_PART_HEAD_BYTES};
 use crate::outbound::Outbound;
 use crate::settings::Settings;
 use rohrpost_mailbox::{Participant, StreamReader, SystemTime};
-use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 /// Next step for the code around the core.
@@ -48,28 +48,25 @@ pub struct ReplicaSender {
     requests: SentRequests,
     /// The nodes that such requests go to, one bit each.
     origins: u64,
-    /// The most important first.
-    streams: Vec<OutgoingReplica>,
-    /// Of each level, the first of its streams to be asked.
-    turns: [usize; LEVELS],
+    by_level: StreamsByLevel,
 }
 
 impl ReplicaSender {
     /// Of all `replicas` those that are written on this node.
     pub fn new(settings: &Settings, replicas: &[ReplicaSettings]) -> Self {
         let own = (0..).zip(replicas).filter(|(_, replica)| replica.node == settings.own);
-        let mut streams: Vec<_> = own.map(|(place, replica)| OutgoingReplica::new(place, replica, settings)).collect();
-        streams.sort_by_key(|stream| stream.settings.level);
+        let part_bytes = part_bytes(settings);
+        let streams = own.map(|(place, replica)| OutgoingReplica::new(place, replica, settings.peers(), part_bytes));
+        let by_level = StreamsByLevel::new(streams.collect());
         let here = replicas.iter().filter(|replica| replica.to & 1 << settings.own != 0);
         let origins = here.fold(0, |all, replica| all | 1 << replica.node) & !(1 << settings.own);
         let (plan, requests) = (RequestPlan::new(settings, replicas), SentRequests::default());
-        let (part_bytes, incarnation) = (part_bytes(settings), settings.incarnation);
-        Self { part_bytes, incarnation, plan, requests, origins, streams, turns: [0; LEVELS] }
+        Self { part_bytes, incarnation: settings.incarnation, plan, requests, origins, by_level }
     }
 
     /// Whether no stream of this node has a replica, and this one has none.
     pub fn is_empty(&self) -> bool {
-        self.streams.is_empty() && self.origins == 0
+        self.by_level.streams.is_empty() && self.origins == 0
     }
 
     /// Rings between this half and [`ReplicaReceiver::asking_by`](super::ReplicaReceiver::asking_by): that one's ends.
@@ -82,25 +79,25 @@ impl ReplicaSender {
 
     /// The nodes that something goes to, one bit each.
     pub(crate) fn peers(&self) -> u64 {
-        let all = self.streams.iter().flat_map(|stream| &stream.destinations);
+        let all = self.by_level.streams.iter().flat_map(|stream| &stream.destinations);
         all.fold(self.origins, |peers, destination| peers | 1 << destination.peer)
     }
 
     /// Counters of each replica and node.
     pub fn counts(&self) -> Vec<Arc<SentReplica>> {
-        let all = self.streams.iter().flat_map(|stream| &stream.destinations);
+        let all = self.by_level.streams.iter().flat_map(|stream| &stream.destinations);
         all.map(|destination| destination.counts.clone()).collect()
     }
 
     /// Looks which modules have begun, and what they say of their streams. A few system calls: call it now and then.
     pub fn look(&mut self, participant: &Arc<Participant>, describe: &dyn Describe) {
-        self.streams.iter_mut().for_each(|stream| stream.look(participant, describe));
+        self.by_level.streams.iter_mut().for_each(|stream| stream.look(participant, describe));
     }
 
     /// The streams that are read, to sleep until there is a record, and whether a request waits.
     pub fn waits_on(&mut self) -> (Vec<&mut StreamReader>, impl Fn() -> bool + '_) {
-        let Self { streams, requests, .. } = self;
-        let awaited = streams.iter_mut().filter(|stream| !stream.is_stalled);
+        let Self { by_level, requests, .. } = self;
+        let awaited = by_level.streams.iter_mut().filter(|stream| !stream.is_stalled);
         (awaited.filter_map(|stream| stream.reader.as_mut()).collect(), || !requests.is_empty())
     }
 
@@ -116,25 +113,22 @@ impl ReplicaSender {
         outbound: &mut Outbound,
         datagram: &mut [u8],
     ) -> ReplicaStep {
-        for stream in &mut self.streams {
-            stream.refresh();
-            stream.meet(now_ns, outbound);
-        }
+        self.by_level.refresh(now_ns, outbound);
         for (from, request) in self.requests.take_next() {
-            let stream = self.streams.iter_mut().find(|stream| stream.place == request.place);
+            let stream = self.by_level.streams.iter_mut().find(|stream| stream.place == request.place);
             stream.into_iter().for_each(|stream| stream.ask(from, &request, (self.incarnation, self.part_bytes)));
         }
         loop {
             let ready = outbound.ready_peers();
-            let chosen = self.choose(now_ns, ready);
-            let level = chosen.map(|(at, _)| self.streams[at].settings.level);
+            let chosen = self.by_level.choose(now_ns, ready);
+            let level = chosen.map(|(at, _)| self.by_level.streams[at].settings.level);
             match self.requests.next(now_ns, level, outbound, datagram) {
                 Some(Ok((to, bytes))) => return ReplicaStep::Send { to, bytes },
                 Some(Err(until_ns)) => return ReplicaStep::Wait { until_ns },
                 None => {}
             }
             let Some((at, to)) = chosen else { return self.wait(now_ns) };
-            let stream = &mut self.streams[at];
+            let stream = &mut self.by_level.streams[at];
             let level = stream.settings.level;
             if let Err(until_ns) = outbound.may_leave(now_ns, level) {
                 return ReplicaStep::Wait { until_ns };
@@ -144,35 +138,16 @@ impl ReplicaSender {
             let content = &mut datagram[frame::HEAD_BYTES..][..RECORD_PART_HEAD_BYTES + self.part_bytes];
             let filled = stream.fill(now_ns, &system, (to, self.part_bytes), content);
             let Some((kind, bytes)) = filled else { continue };
-            if stream.destinations[to].under_way.is_none() && !stream.destinations[to].is_asked() {
-                self.turns[usize::from(level)] = at + 1;
-            }
-            stream.turn = to + 1;
-            let to = stream.destinations[to].peer;
-            return ReplicaStep::Send { to, bytes: outbound.carry(now_ns, (kind, level), to, (datagram, bytes)) };
+            let peer = stream.destinations[to].peer;
+            self.by_level.made((at, to));
+            let bytes = outbound.carry(now_ns, (kind, level), peer, (datagram, bytes));
+            return ReplicaStep::Send { to: peer, bytes };
         }
-    }
-
-    /// A stream and one of its destinations that have something for a ready peer: of the most important level, and
-    /// there in turn.
-    fn choose(&mut self, now_ns: u64, ready: u64) -> Option<(usize, usize)> {
-        let mut begin = 0;
-        for level in self.streams.chunk_by_mut(|a, b| a.settings.level == b.settings.level) {
-            let count = level.len();
-            let turn = self.turns[usize::from(level[0].settings.level)];
-            let first = turn.checked_sub(begin).filter(|first| *first < count).unwrap_or(0);
-            for at in (0..count).map(|step| (first + step) % count) {
-                if let Some(to) = level[at].choose(now_ns, ready) {
-                    return Some((begin + at, to));
-                }
-            }
-            begin += count;
-        }
-        None
     }
 
     fn wait(&self, now_ns: u64) -> ReplicaStep {
-        let all = || self.streams.iter().flat_map(|stream| stream.destinations.iter().map(move |to| (stream, to)));
+        let all =
+            || self.by_level.streams.iter().flat_map(|stream| stream.destinations.iter().map(move |to| (stream, to)));
         if all().any(|(stream, to)| stream.waits_for(to)) {
             // For room in a socket: that is known elsewhere.
             return ReplicaStep::Wait { until_ns: u64::MAX };

@@ -1,7 +1,9 @@
 //! Both halves, over a wire in memory: with the outbound and the inbound that ship, and rings of two nodes.
 
 mod asked;
+mod by_line;
 mod changed;
+mod hops;
 mod hostile;
 mod joining;
 mod lossy;

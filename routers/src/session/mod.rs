@@ -14,6 +14,9 @@
 //! lost. Packages of one sender, receiver and priority stay in their order. No client can make the server wait, and
 //! nobody can use more than its share of places, ranges, memory or line by connecting more often: shares go by
 //! principal.
+//!
+//! Replicas go by the same streams: a part is made ready when nothing else is, and no package waits. So a package waits
+//! for one part at most, and no queue holds records: see [`LineReplicas`].
 
 pub mod client;
 mod counts;
@@ -21,6 +24,7 @@ mod estimate;
 pub mod frame;
 mod ledger;
 mod outgoing;
+mod parts;
 pub mod server;
 mod splitter;
 mod table;
@@ -30,6 +34,7 @@ pub use estimate::{Bounded, ServerClockEstimate};
 pub use outgoing::BATCH_BYTES;
 pub use table::{Conflict, ENTRIES_MAX, RoutingTable};
 
+use crate::replication::LineReplicas;
 use rohrpost_mailbox::{Head, Kind, Name, Options, Type};
 
 /// A client by its place at the server; free again when its connection has been closed.
@@ -56,6 +61,14 @@ pub const HANDSHAKE_MAX_NS: u64 = 5_000_000_000;
 pub const FRAME_MAX_NS: u64 = 30_000_000_000;
 /// Interval between two looks for what only the passing of time changes.
 pub const LOOK_EVERY_NS: u64 = 100_000_000;
+
+/// The replicas of an end of sessions.
+pub trait ReplicaEnd {
+    /// They; none: it has none, and what comes of such is not counted.
+    fn replicas(&mut self) -> Option<&mut LineReplicas> {
+        None
+    }
+}
 
 /// Writes the error replies to commands that go no further. The routers do not know how an error is encoded.
 pub trait ErrorReplies {

@@ -10,7 +10,7 @@
 
 use super::WAIT_MAX_NS;
 use super::counts::Cause;
-use super::frame::{Carried, HEAD_BYTES, SessionMessage};
+use super::frame::{Carried, HEAD_BYTES, SessionFrameKind, SessionMessage, write_head};
 use crate::queue::{Place, Queue, QueueShare, QueuedPackage, counts_newest};
 use rohrpost_mailbox::Head;
 use rohrpost_network::LEVELS;
@@ -190,6 +190,19 @@ impl Outgoing {
             queue.serve(place);
         }
         self.queue = Some(queue);
+    }
+
+    /// Makes a part of a replica ready, if nothing else is and nothing waits. `write` puts what follows the head of the
+    /// frame into the room that it gets, and says how long it is; none: there is none.
+    pub(super) fn add_part(&mut self, room: usize, write: impl FnOnce(&mut [u8]) -> Option<(SessionFrameKind, usize)>) {
+        if !self.ready().is_empty() || self.has_waiting() {
+            return;
+        }
+        self.forget_taken();
+        self.ready.resize(HEAD_BYTES + room, 0);
+        let made = write(&mut self.ready[HEAD_BYTES..]);
+        self.ready.truncate(made.map_or(0, |(_, length)| HEAD_BYTES + length));
+        made.into_iter().for_each(|(kind, length)| write_head(kind, length, &mut self.ready));
     }
 
     /// Gives up what waited too long. `cause`: why it did.

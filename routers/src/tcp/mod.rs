@@ -14,6 +14,7 @@ mod client;
 mod fault_writer;
 mod line_throttle;
 mod pace;
+mod replicas;
 mod seal;
 mod server;
 mod snapshots;
@@ -21,6 +22,7 @@ mod stream;
 mod validity;
 
 pub use client::{ClientError, ClientParts, ClientShell};
+pub use replicas::{LineCounts, LineParts};
 pub use seal::{AUTHORITY, Authority, ClientSeal, Holder, PREFIX, SealError, Sealed, ServerSeal, is_about};
 pub use server::{ServerError, ServerParts, ServerShell};
 pub use snapshots::{Class, ClientLink, LinkState, MEMBERS_MAX, MemberSnapshot, Members, Outage};

@@ -95,6 +95,7 @@ pub(crate) fn start_for(
         seal,
         names: names.unwrap_or_default(),
         node,
+        replicas: None,
     })
 }
 
@@ -156,6 +157,7 @@ impl System {
             seal,
             keeps_time: false,
             impair: None,
+            replicas: None,
         };
         let client = ClientShell::start(parts).unwrap();
         let participant = Participant::join(&node, module(id)).unwrap();

@@ -6,7 +6,7 @@ use rohrpost_routers::report::NotDelivered;
 use rohrpost_routers::session::client::{self, Client, ClientSettings};
 use rohrpost_routers::session::frame::{Carried, HEAD_BYTES, LENGTH_MAX, SessionFrameHead, SessionMessage};
 use rohrpost_routers::session::server::{self, OwnNodes, Server, ServerSettings, ServerStep};
-use rohrpost_routers::session::{Cause, ErrorReplies};
+use rohrpost_routers::session::{Cause, ErrorReplies, ReplicaEnd};
 
 pub(crate) const MS: u64 = 1_000_000;
 pub(crate) const BEGIN_NS: u64 = 1000 * MS;
@@ -42,6 +42,8 @@ fn frames(mut stream: &[u8]) {
 
 /// Ignores all events.
 pub(crate) struct Deaf;
+
+impl ReplicaEnd for Deaf {}
 
 impl ErrorReplies for Deaf {
     fn answer(&mut self, _: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {

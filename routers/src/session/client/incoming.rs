@@ -3,6 +3,7 @@
 use super::asking::Asking;
 use super::{Client, ClientEvent, ClientHost, ClientPackage, ClientState, REGISTER_AGAIN_NS, Registration, Reported};
 use crate::admission::{ArrivalPath, NotAdmitted, capped};
+use crate::frame::ReplicaFrame;
 use crate::session::counts::Cause;
 use crate::session::estimate::ServerClockEstimate;
 use crate::session::frame::{
@@ -37,10 +38,22 @@ impl Client {
             (ClientState::Handshake { .. }, SessionMessage::Welcome(welcome)) => self.welcomed(now_ns, welcome, host),
             (ClientState::Member, SessionMessage::Registered(verdict)) => self.registered(now_ns, verdict, host),
             (ClientState::Member, SessionMessage::Package(carried)) => self.take(now_ns, carried, host),
+            (ClientState::Member, SessionMessage::Record(part)) => {
+                self.take_part(now_ns, &ReplicaFrame::Record(*part), host);
+            }
+            (ClientState::Member, SessionMessage::Description(part)) => {
+                self.take_part(now_ns, &ReplicaFrame::Description(*part), host);
+            }
             (ClientState::Member, SessionMessage::Answer(answer)) => {
                 self.estimate.heard(now_ns, answer);
             }
             _ => self.damaged(now_ns, BadSessionFrame::Damaged("a frame that is not for now"), host),
+        }
+    }
+
+    fn take_part(&self, now_ns: u64, part: &ReplicaFrame<'_>, host: &mut impl ClientHost) {
+        if let Some(replicas) = host.replicas() {
+            replicas.take(now_ns, (Some(replicas.server()), self.server_incarnation), part);
         }
     }
 
@@ -68,6 +81,7 @@ impl Client {
         if verdict.objection.is_none() {
             self.registration = Registration::Holds;
             self.told = Some(Reported::Up);
+            self.set_line(now_ns, true, host);
             return host.event(ClientEvent::Up);
         }
         self.registration = Registration::Due(now_ns + REGISTER_AGAIN_NS);
@@ -138,6 +152,7 @@ impl Client {
             self.down_ns = now_ns;
             host.event(ClientEvent::Down);
         }
+        self.set_line(now_ns, false, host);
         if self.told != Some(told) {
             host.event(event);
         }

@@ -8,21 +8,20 @@
 
 mod asking;
 mod backoff;
+mod host;
 mod incoming;
 mod sending;
 
 pub use backoff::BACKOFF_MAX_NS;
+pub use host::{ClientEvent, ClientHost};
 
 use super::counts::{Cause, SessionCounts};
 use super::estimate::{Bounded, ServerClockEstimate};
-use super::frame::{
-    Carried, Range, RegistrationVerdict, SessionHello, SessionMessage, SessionRefusal, SessionRefusalReason,
-};
+use super::frame::{Range, SessionHello, SessionMessage, SessionRefusalReason};
 use super::outgoing::Outgoing;
 use super::splitter::Splitter;
-use super::{ErrorReplies, HANDSHAKE_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
+use super::{HANDSHAKE_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
 use crate::admission::Admission;
-use crate::report::NotDelivered;
 use asking::Asking;
 use backoff::Backoff;
 use rohrpost_mailbox::{Head, TimeRecord};
@@ -88,36 +87,6 @@ pub enum ClientStep {
     },
 }
 
-/// A change that people are told once.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum ClientEvent<'a> {
-    /// The server takes and brings packages.
-    Up,
-    /// It does not any more.
-    Down,
-    /// The server lets it not take part; it goes on trying.
-    Refused(&'a SessionRefusal<'a>),
-    /// It may not host what it says; it goes on trying.
-    Objected(&'a RegistrationVerdict<'a>),
-    /// What came is nothing of ours.
-    Damaged(super::frame::BadSessionFrame),
-}
-
-/// What a client needs from the code that runs it.
-pub trait ClientHost: ErrorReplies {
-    /// Puts a package that came into its mailbox. Its `published_ns` is an estimate by the monotonic clock here.
-    ///
-    /// # Errors
-    /// [`NotDelivered`]
-    fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered>;
-
-    /// A command that came is not allowed, by the rule in this line of the configuration; its answer is asked for next.
-    fn not_allowed(&mut self, _line: Option<usize>) {}
-
-    /// Something happened.
-    fn event(&mut self, event: ClientEvent<'_>);
-}
-
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum ClientState {
     Away { until_ns: u64 },
@@ -150,6 +119,10 @@ pub struct Client {
     outgoing: Outgoing,
     is_blocked: bool,
     is_slow: bool,
+    /// Parts of replicas may leave and come.
+    has_line: bool,
+    /// Some may wait.
+    has_parts: bool,
     estimate: ServerClockEstimate,
     /// The end with these clocks.
     server_incarnation: u64,
@@ -189,6 +162,8 @@ impl Client {
             outgoing: Outgoing::new(settings.quota_bytes),
             is_blocked: false,
             is_slow: false,
+            has_line: false,
+            has_parts: false,
             estimate: ServerClockEstimate::default(),
             server_incarnation: 0,
             out: SessionCounts::default(),
@@ -301,6 +276,7 @@ impl Client {
             self.told = None;
             host.event(ClientEvent::Down);
         }
+        self.set_line(now_ns, false, host);
         if matches!(self.state, ClientState::Connecting { .. }) {
             // What the server said was before it went away.
             self.told = None;
@@ -321,7 +297,7 @@ impl Client {
 
     /// Whether more waits than is ready.
     pub fn has_waiting(&self) -> bool {
-        self.outgoing.has_waiting()
+        self.outgoing.has_waiting() || self.has_parts
     }
 
     /// The stream has taken so many of them. If those were not all, nothing more is written until [`Client::writable`].
@@ -366,10 +342,12 @@ impl Client {
             }
         }
         self.ask(now_ns);
+        host.replicas().into_iter().for_each(|replicas| replicas.refresh(now_ns));
         if self.is_blocked {
             return ClientStep::Wait { until_ns: self.look_ns };
         }
         self.refill(now_ns, host);
+        self.add_part(now_ns, host);
         match self.outgoing.ready() {
             [] => ClientStep::Wait { until_ns: self.next_ns() },
             _ => ClientStep::Write,

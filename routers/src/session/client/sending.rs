@@ -9,6 +9,7 @@ use crate::session::counts::Cause;
 use crate::session::frame::{Carried, Ranges, SessionMessage};
 use crate::session::ledger::Ledger;
 use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
+use crate::session::parts::add_part;
 use rohrpost_mailbox::{Name, Priority};
 
 impl Client {
@@ -76,6 +77,21 @@ impl Client {
         if let Some(shift_ns) = self.shift_ns(now_ns) {
             self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.refill(now_ns, shift_ns, ledger));
         }
+    }
+
+    /// Parts of replicas may leave and come from now on, or not any more.
+    pub(super) fn set_line(&mut self, now_ns: u64, is_there: bool, host: &mut impl ClientHost) {
+        let was_there = std::mem::replace(&mut self.has_line, is_there);
+        let Some(replicas) = host.replicas().filter(|_| was_there != is_there) else { return };
+        let server = replicas.server();
+        if is_there { replicas.came(now_ns, server) } else { replicas.left(now_ns, server) }
+    }
+
+    /// Makes the next part of a replica ready, if nothing else is.
+    pub(super) fn add_part(&mut self, now_ns: u64, host: &mut impl ClientHost) {
+        self.has_parts = false;
+        let Some(server) = host.replicas().map(|replicas| replicas.server()).filter(|_| self.is_up()) else { return };
+        self.has_parts = add_part(&mut self.outgoing, now_ns, server, host);
     }
 
     /// Does something with what leaves, and answers the commands of this end that are lost thereby.

@@ -1,5 +1,7 @@
 //! Why bytes are no frame of ours.
 
+use crate::frame::BadFrame;
+
 /// The version of this format; the head, the first eight bytes of a hello, and a refusal mean the same in all of them.
 pub const VERSION: u8 = 1;
 
@@ -21,4 +23,13 @@ pub enum BadSessionFrame {
     /// Wrong in itself.
     #[error("damaged: {0}")]
     Damaged(&'static str),
+}
+
+impl From<BadFrame> for BadSessionFrame {
+    fn from(bad: BadFrame) -> Self {
+        match bad {
+            BadFrame::Damaged(what) => Self::Damaged(what),
+            _ => Self::Damaged("a part of a replica is none"),
+        }
+    }
 }

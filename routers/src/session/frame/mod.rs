@@ -7,6 +7,7 @@
 //! │ length │ kind │ hops │ 0 │ `length` bytes, as the kind says                                    │
 //! └────────┴──────┴──────┴───┴────────────────────────────────────────────────────────────────────┘
 //!  client: hello, then register, then package and ask       server: welcome or refusal, registered, package, answer
+//!  both, for replicas: record part, description
 //! ```
 //!
 //! All fields of ours are little-endian; the head of a package is in the order that its own options tell. Each frame is
@@ -23,6 +24,7 @@ pub use carried::{Carried, TimeAnswer};
 pub use handshake::{NAME_BYTES_MAX, SessionHello, SessionRefusal, SessionRefusalReason, Welcome};
 pub use ranges::{Objection, RANGES_MAX, Range, Ranges, RegistrationVerdict};
 
+use crate::frame::{DescriptionPart, RecordPart};
 use fields::FieldReader;
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES as PACKAGE_HEAD_BYTES};
 
@@ -57,10 +59,14 @@ pub enum SessionFrameKind {
     Ask = 7,
     /// Server: the time.
     Answer = 8,
+    /// A part of a record of a replica.
+    RecordPart = 9,
+    /// A part of the description of the module that writes the stream of a replica.
+    Description = 10,
 }
 
 impl SessionFrameKind {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 10] = [
         Self::Hello,
         Self::Welcome,
         Self::Refusal,
@@ -69,6 +75,8 @@ impl SessionFrameKind {
         Self::Package,
         Self::Ask,
         Self::Answer,
+        Self::RecordPart,
+        Self::Description,
     ];
 }
 
@@ -117,6 +125,12 @@ pub(super) const fn is_tls(bytes: &[u8]) -> bool {
 
 const _: () = assert!(LENGTH_MAX < 0x01_03_14, "no head begins as a record of TLS");
 
+/// Writes the head of a frame that has so many bytes behind it.
+pub(super) fn write_head(kind: SessionFrameKind, length: usize, head: &mut [u8]) {
+    head[..4].copy_from_slice(&(length as u32).to_le_bytes());
+    head[4..HEAD_BYTES].copy_from_slice(&[kind as u8, 0, 0, 0]);
+}
+
 /// A parsed frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SessionMessage<'a> {
@@ -136,6 +150,10 @@ pub enum SessionMessage<'a> {
     Ask(u64),
     /// The answer.
     Answer(TimeAnswer),
+    /// A part of a record.
+    Record(RecordPart<'a>),
+    /// A part of a description.
+    Description(DescriptionPart<'a>),
 }
 
 impl<'a> SessionMessage<'a> {
@@ -154,6 +172,8 @@ impl<'a> SessionMessage<'a> {
             SessionFrameKind::Package => Self::Package(Carried::parse(head.hops, &mut fields)?),
             SessionFrameKind::Ask => Self::Ask(fields.long()?),
             SessionFrameKind::Answer => Self::Answer(TimeAnswer::parse(&mut fields)?),
+            SessionFrameKind::RecordPart => Self::Record(RecordPart::parse(fields.rest())?),
+            SessionFrameKind::Description => Self::Description(DescriptionPart::parse(fields.rest())?),
         };
         if !fields.rest().is_empty() {
             return Err(BadSessionFrame::Damaged("a frame with bytes behind its end"));
@@ -172,6 +192,14 @@ impl<'a> SessionMessage<'a> {
             Self::Package(carried) => frame(into, SessionFrameKind::Package, carried.hops, |into| carried.write(into)),
             Self::Ask(asked_ns) => frame(into, SessionFrameKind::Ask, 0, |into| into.extend(asked_ns.to_le_bytes())),
             Self::Answer(answer) => frame(into, SessionFrameKind::Answer, 0, |into| answer.write(into)),
+            Self::Record(part) => frame(into, SessionFrameKind::RecordPart, 0, |into| {
+                into.extend(part.head_bytes());
+                into.extend(part.bytes);
+            }),
+            Self::Description(part) => frame(into, SessionFrameKind::Description, 0, |into| {
+                into.extend(part.head_bytes());
+                into.extend(part.bytes);
+            }),
         }
     }
 }

@@ -16,6 +16,25 @@ fn read(bytes: &[u8]) -> Result<SessionMessage<'_>, BadSessionFrame> {
 
 const TIME: TimeAnswer = TimeAnswer { asked_ns: 1, came_ns: 2, left_ns: 3, system_ns: 4, error_ns: 5, epoch: 6 };
 
+const RECORD: RecordPart<'static> = RecordPart {
+    place: 1,
+    generation: 2,
+    description: 3,
+    incarnation: 4,
+    len: 9,
+    offset: 5,
+    sequence: 6,
+    epoch: 7,
+    stamp_ns: 8,
+    written_ns: 9,
+    error_ns: 10,
+    step: 11,
+    sampled: 12,
+    bytes: b"part",
+};
+const DESCRIPTION: DescriptionPart<'static> =
+    DescriptionPart { place: 1, generation: 2, check: 3, len: 9, offset: 5, written: 4, bytes: b"part" };
+
 fn each(check: impl Fn(&SessionMessage<'_>)) {
     let range = Range::module(Name::new(1, 200, 0, 0));
     let mut bytes = Vec::new();
@@ -54,6 +73,9 @@ fn each(check: impl Fn(&SessionMessage<'_>)) {
         SessionMessage::Package(Carried { hops: 2, published_ns: 7, head, body: &[1, 2, 3] }),
         SessionMessage::Ask(8),
         SessionMessage::Answer(TIME),
+        SessionMessage::Record(RECORD),
+        SessionMessage::Record(RecordPart { len: 0, offset: 0, bytes: &[], ..RECORD }),
+        SessionMessage::Description(DESCRIPTION),
     ] {
         check(&message);
     }
@@ -69,7 +91,7 @@ fn a_frame_that_is_cut_short_is_damaged() {
     each(|message| {
         let bytes = written(message);
         for length in 0..bytes.len() - HEAD_BYTES {
-            // Texts may be shorter, and ranges fewer.
+            // Texts and parts may be shorter, and ranges fewer.
             let mut cut = bytes[..HEAD_BYTES + length].to_vec();
             cut[..4].copy_from_slice(&(length as u32).to_le_bytes());
             match (message, read(&cut)) {
@@ -78,7 +100,9 @@ fn a_frame_that_is_cut_short_is_damaged() {
                     SessionMessage::Hello(_)
                     | SessionMessage::Refusal(_)
                     | SessionMessage::Registered(_)
-                    | SessionMessage::Register(_),
+                    | SessionMessage::Register(_)
+                    | SessionMessage::Record(_)
+                    | SessionMessage::Description(_),
                     Ok(_),
                 ) => {}
                 (_, other) => panic!("{message:?} cut to {length}: {other:?}"),

@@ -2,6 +2,7 @@
 
 use super::member::{MemberState, PendingRefusal, RoundTrip, TimeRequest};
 use super::{Server, ServerEvent, ServerHost};
+use crate::frame::ReplicaFrame;
 use crate::session::frame::{
     BadSessionFrame, HELLO_LENGTH_MAX, LENGTH_MAX, NAME_BYTES_MAX, SessionHello, SessionMessage, SessionRefusalReason,
 };
@@ -54,6 +55,12 @@ impl Server {
             (MemberState::Handshake, SessionMessage::Hello(hello)) => self.take_hello(now_ns, client, hello, host),
             (MemberState::Member, SessionMessage::Register(ranges)) => self.register(now_ns, client, *ranges, host),
             (MemberState::Member, SessionMessage::Package(carried)) => self.carry(now_ns, client, carried, host),
+            (MemberState::Member, SessionMessage::Record(part)) => {
+                self.take_part(now_ns, client, &ReplicaFrame::Record(*part), host);
+            }
+            (MemberState::Member, SessionMessage::Description(part)) => {
+                self.take_part(now_ns, client, &ReplicaFrame::Description(*part), host);
+            }
             (MemberState::Member, SessionMessage::Ask(asked_ns)) => {
                 // Of several questions the last is answered: that bounds what waits.
                 let by_hello = member.asked.is_some_and(|asked| asked.by_hello);

@@ -52,6 +52,7 @@ impl Server {
         let (principal, ranges) = (member.principal_id, member.registrations.ranges);
         if ranges > 0 {
             self.table.remove(client);
+            self.look_at_node(now_ns, client, host);
         }
         if let Some(uses) = self.places.principals.uses_mut(principal) {
             uses.ranges = uses.ranges.saturating_sub(ranges);

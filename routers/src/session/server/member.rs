@@ -3,6 +3,7 @@
 use super::principal::{Principal, PrincipalId};
 use super::rights::Rights;
 use super::work::Registrations;
+use crate::frame::NodeIndex;
 use crate::session::frame::{RegistrationVerdict, SessionHello, SessionRefusalReason};
 use crate::session::outgoing::Outgoing;
 use crate::session::splitter::Splitter;
@@ -100,6 +101,10 @@ pub(super) struct Member {
     pub(super) is_blocked: bool,
     /// It stands in the list of those for which something is to be done.
     pub(super) is_due: bool,
+    /// The node that it is the client of, where that has replicas by it.
+    pub(super) node: Option<NodeIndex>,
+    /// Parts of replicas may wait for it.
+    pub(super) has_parts: bool,
 }
 
 impl Member {
@@ -131,6 +136,8 @@ impl Member {
             moved_ns: now_ns,
             is_blocked: false,
             is_due: false,
+            node: None,
+            has_parts: false,
         }
     }
 
@@ -161,7 +168,7 @@ impl Member {
     pub(super) fn has_more(&self) -> bool {
         let is_leaving = matches!(self.state, MemberState::Leaving { .. });
         let says = self.asked.is_some() || self.verdict.is_some() || self.refused.is_some();
-        is_leaving || says || self.outgoing.has_waiting()
+        is_leaving || says || self.outgoing.has_waiting() || self.has_parts
     }
 
     pub(super) fn bytes(&self) -> usize {

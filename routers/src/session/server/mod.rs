@@ -14,6 +14,7 @@ mod member;
 mod places;
 mod principal;
 mod registering;
+mod replicas;
 mod rights;
 mod work;
 
@@ -26,7 +27,7 @@ use super::ClientIndex;
 use super::counts::SessionCounts;
 use super::frame::{RegistrationVerdict, SessionRefusalReason};
 use super::table::RoutingTable;
-use super::{ErrorReplies, LOOK_EVERY_NS};
+use super::{ErrorReplies, LOOK_EVERY_NS, ReplicaEnd};
 use member::{Member, RoundTrip};
 use places::Places;
 use principal::Principal;
@@ -132,7 +133,7 @@ pub enum ServerEvent<'a> {
 }
 
 /// What the server needs from the code that runs it.
-pub trait ServerHost: ErrorReplies {
+pub trait ServerHost: ErrorReplies + ReplicaEnd {
     /// Something happened.
     fn event(&mut self, event: ServerEvent<'_>);
 }
@@ -256,7 +257,7 @@ impl Server {
 
     /// Whether more waits than is ready.
     pub fn has_waiting(&self, client: ClientIndex) -> bool {
-        self.member(client).is_some_and(|member| member.outgoing.has_waiting())
+        self.member(client).is_some_and(|member| member.outgoing.has_waiting() || member.has_parts)
     }
 
     /// The stream has taken so many of them. If those were not all, nothing more is written until [`Server::writable`].
@@ -307,6 +308,7 @@ impl Server {
             self.look_ns = now_ns + LOOK_EVERY_NS;
             self.look(now_ns, host);
         }
+        self.look_for_parts(now_ns, host);
         while let Some(client) = self.due.pop_front() {
             let Some(member) = self.member_mut(client) else { continue };
             member.is_due = false;
@@ -315,6 +317,7 @@ impl Server {
                 continue;
             }
             self.refill(now_ns, client, host);
+            self.add_part(now_ns, client, host);
             match self.member(client) {
                 Some(member) if !member.outgoing.ready().is_empty() && !is_over => return ServerStep::Write(client),
                 Some(member) if matches!(member.state, MemberState::Leaving { .. }) => {

@@ -140,6 +140,7 @@ impl Server {
             }
             member.verdict = Some(PendingVerdict { verdict, holder });
         }
+        self.look_at_node(now_ns, client, host);
         self.is_due(client);
     }
 }

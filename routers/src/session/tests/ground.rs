@@ -2,11 +2,13 @@
 
 use super::plan::{address, client_settings, module, ranges, server_settings};
 use super::world::S;
+use super::world::rings::Rings;
+use crate::replication::LineReplicas;
 use crate::report::NotDelivered;
 use crate::session::client::{self, Client, ClientPackage};
 use crate::session::frame::{Carried, Range};
 use crate::session::server::{self, Server};
-use crate::session::{Cause, ClientIndex, ErrorReplies};
+use crate::session::{Cause, ClientIndex, ErrorReplies, ReplicaEnd};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 
 /// Notes all that is told.
@@ -17,6 +19,8 @@ pub(super) struct Notes {
     pub(super) lost: Vec<Cause>,
     /// Lines of the rules by which commands are not allowed.
     pub(super) rules: Vec<Option<usize>>,
+    /// Its replicas, if it has some.
+    pub(super) rings: Option<Rings>,
 }
 
 impl ErrorReplies for Notes {
@@ -24,6 +28,12 @@ impl ErrorReplies for Notes {
         self.lost.push(why);
         answer.extend(why.word().bytes());
         true
+    }
+}
+
+impl ReplicaEnd for Notes {
+    fn replicas(&mut self) -> Option<&mut LineReplicas> {
+        self.rings.as_mut().map(|rings| &mut rings.line)
     }
 }
 
@@ -76,10 +86,19 @@ impl Ground {
         settings: server::ServerSettings,
         clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
     ) -> Self {
+        Self::with_said(settings, clients, Notes::default())
+    }
+
+    /// A server that tells these.
+    pub(super) fn with_said(
+        settings: server::ServerSettings,
+        clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
+        said: Notes,
+    ) -> Self {
         let now_ns = 100 * S;
         let server = Server::new(settings);
         let end = |(settings, ranges)| (Client::new(settings, ranges, now_ns), None, Notes::default());
-        let mut ground = Self { now_ns, server, said: Notes::default(), ends: clients.into_iter().map(end).collect() };
+        let mut ground = Self { now_ns, server, said, ends: clients.into_iter().map(end).collect() };
         ground.settle();
         ground
     }

@@ -8,6 +8,7 @@ mod oracle;
 mod pipe;
 mod plan;
 mod registering;
+mod replicas;
 mod shares;
 mod strain;
 mod world;

@@ -1,9 +1,10 @@
 //! What is true, which neither end knows: every package with its fate, and what must hold of them.
 
 use super::plan::ROUTER;
+use crate::replication::LineReplicas;
 use crate::report::NotDelivered;
 use crate::session::frame::{Carried, Range};
-use crate::session::{AGE_MAX_NS, Cause, ErrorReplies, client, server};
+use crate::session::{AGE_MAX_NS, Cause, ErrorReplies, ReplicaEnd, client, server};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options, local};
 use rohrpost_testbed::sim::chance::Chance;
 use std::collections::BTreeMap;
@@ -124,6 +125,8 @@ pub(super) struct Teller<'a> {
     /// Which client; the server has none.
     pub(super) client: usize,
     pub(super) chance: &'a mut Chance,
+    /// Its replicas, if it has some.
+    pub(super) line: Option<&'a mut LineReplicas>,
 }
 
 impl ErrorReplies for Teller<'_> {
@@ -147,6 +150,12 @@ impl ErrorReplies for Teller<'_> {
         answer.extend(LOST);
         answer.extend((number as u64).to_le_bytes());
         true
+    }
+}
+
+impl ReplicaEnd for Teller<'_> {
+    fn replicas(&mut self) -> Option<&mut LineReplicas> {
+        self.line.as_deref_mut()
     }
 }
 

@@ -33,6 +33,10 @@ pub(super) struct Plan {
     /// This one sends what is urgent, more than the lines of all others carry. The others send commands, and their
     /// lines hold little.
     pub(super) flooder: Option<usize>,
+    /// Streams go along, more than slow lines carry.
+    pub(super) has_replicas: bool,
+    /// The kernels hold little of each line.
+    pub(super) holds_little: bool,
 }
 
 impl Plan {
@@ -41,11 +45,30 @@ impl Plan {
         let clients = chance.between(3, 7) as usize;
         let lines = (0..clients).map(|_| chance.scale(20, 100_000)).collect();
         let per_s = chance.scale(100, 3000);
-        Self { seed, clients, calm: false, stalled: None, lines, held_bytes: None, per_s, flooder: None }
+        Self {
+            seed,
+            clients,
+            calm: false,
+            stalled: None,
+            lines,
+            held_bytes: None,
+            per_s,
+            flooder: None,
+            has_replicas: false,
+            holds_little: false,
+        }
     }
 
     pub(super) fn calm(seed: u64) -> Self {
         Self { calm: true, lines: vec![100_000; 7], per_s: 500, ..Self::rough(seed) }
+    }
+
+    /// Replicas beside little else, on lines of 40 kB a second and more.
+    pub(super) fn replicated(seed: u64) -> Self {
+        let mut chance = Chance::new(seed ^ 0xe1a);
+        let plan = Self::rough(seed);
+        let lines = (0..plan.clients).map(|_| chance.scale(40, 10_000)).collect();
+        Self { lines, per_s: 30, has_replicas: true, holds_little: true, ..plan }
     }
 
     /// One client floods all others, at rates of some hundred kB a second.

@@ -7,26 +7,27 @@
 //!                   └ sleep ─┘      └──┘  deliver ─▶ mailboxes
 //! ```
 
+mod parts;
 mod reporter;
 mod time;
 
+pub use parts::{ClientError, ClientParts};
+
 use super::bad_line::BadLine;
 use super::fault_writer::FaultWriter;
+use super::replicas::LineCounts;
 use super::seal::ClientSeal;
 use super::snapshots::{Class, ClientLink, LatestValue, LinkState, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
 use crate::admission::capped;
-use crate::impair;
-use crate::session::client::{Client, ClientPackage, ClientSettings, ClientStep};
+use crate::session::client::{Client, ClientPackage, ClientStep};
 use crate::session::frame::{BadSessionFrame, Range};
 use crate::session::in_system;
-use crate::shell::Faults;
 use crate::shell::sender_cache::SenderCache;
 use crate::shell::transit;
 use reporter::EventReporter;
 use rohrpost_mailbox::{
-    ALL_SYSTEMS, CreateError, Head, Interest, Name, Node, NodeError, Participant, Receiver, Watch, Watches,
-    monotonic_ns,
+    ALL_SYSTEMS, Head, Interest, Name, Participant, Receiver, Source, Watch, Watches, monotonic_ns,
 };
 use std::io;
 use std::net::SocketAddr;
@@ -41,57 +42,12 @@ const BURST: usize = 64;
 /// Read before the mailbox has its turn.
 const PIECE_BYTES: usize = 64 * 1024;
 
-/// Why a client does not run.
-#[derive(Debug, thiserror::Error)]
-pub enum ClientError {
-    /// The node's memory.
-    #[error(transparent)]
-    Node(#[from] NodeError),
-    /// Its mailbox.
-    #[error(transparent)]
-    Mailbox(#[from] CreateError),
-    /// What it sleeps with.
-    #[error("a pipe that wakes the client of the TCP router: {0}")]
-    Watches(io::Error),
-    /// What makes the network to the server worse.
-    #[error("a bad line to the TCP router: {0}")]
-    BadLine(io::Error),
-    /// The system has no thread for it.
-    #[error("a thread of the client of the TCP router: {0}; is the limit of processes reached (ulimit -u)?")]
-    Thread(io::Error),
-}
-
-/// Parts of a client.
-pub struct ClientParts<'a> {
-    /// The node that it serves.
-    pub node: &'a Arc<Node>,
-    /// Its name, `tcp.I`.
-    pub name: Name,
-    /// Where the server is.
-    pub server: SocketAddr,
-    /// What it knows.
-    pub settings: ClientSettings,
-    /// The names that its node hosts.
-    pub hosts: Vec<(Name, Name)>,
-    /// The names that other nodes of its system host, if it brings packages for all systems there itself.
-    pub others: Vec<(Name, Name)>,
-    /// The names for which packages go to the server if neither the node nor its LAN has them.
-    pub beyond: Vec<(Name, Name)>,
-    /// How commands are answered that cannot be carried.
-    pub faults: Arc<dyn Faults>,
-    /// Its certificates; none: nothing is sealed.
-    pub seal: Option<ClientSeal>,
-    /// Whether the node's system time is what the server tells.
-    pub keeps_time: bool,
-    /// A bad network to the server; none: as it is.
-    pub impair: Option<impair::ImpairmentSettings>,
-}
-
 /// A client at work; dropped, it ends. What waits in its mailbox stays there.
 pub struct ClientShell {
     shared: Arc<ClientShared>,
     /// Of its thread, which its bell wakes.
     participant: Arc<Participant>,
+    counts: LineCounts,
     /// Ends after the thread does.
     _bad_line: Option<BadLine>,
     thread: Option<JoinHandle<()>>,
@@ -110,7 +66,7 @@ impl ClientShell {
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
         let ClientParts { node, name, server, settings, hosts, others, .. } = parts;
-        let ClientParts { beyond, faults, seal, keeps_time, impair, .. } = parts;
+        let ClientParts { beyond, faults, seal, keeps_time, impair, replicas, .. } = parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;
@@ -120,15 +76,18 @@ impl ClientShell {
         let bad_line = impair.map(|impair| BadLine::begin(server, impair)).transpose().map_err(ClientError::BadLine)?;
         let (shared, system) = (Arc::new(ClientShared::default()), settings.system);
         let range = |(first, last)| Range { first, last };
+        let mut reporter = EventReporter::new(
+            server,
+            SenderCache::here(&participant, &hosts),
+            FaultWriter::new(faults, format!("beyond the TCP router at {server}")),
+        );
+        reporter.line = replicas.map(|parts| parts.start(node, participant.clone()));
+        let counts = LineCounts::of(reporter.line.as_ref());
         let work = ClientThread {
             shared: shared.clone(),
             server: bad_line.as_ref().map_or(server, BadLine::near),
             client: Client::new(settings, hosts.iter().copied().map(range).collect(), monotonic_ns()),
-            reporter: EventReporter::new(
-                server,
-                SenderCache::here(&participant, &hosts),
-                FaultWriter::new(faults, format!("beyond the TCP router at {server}")),
-            ),
+            reporter,
             system,
             others: others.into_iter().map(range).collect(),
             ways_to_others: SenderCache::everywhere(&participant),
@@ -140,12 +99,18 @@ impl ClientShell {
             piece: vec![0; PIECE_BYTES].into(),
         };
         let thread = std::thread::Builder::new().name("tcp-client".into()).spawn(move || work.run());
-        Ok(Self { shared, participant, _bad_line: bad_line, thread: Some(thread.map_err(ClientError::Thread)?) })
+        let thread = Some(thread.map_err(ClientError::Thread)?);
+        Ok(Self { shared, participant, counts, _bad_line: bad_line, thread })
     }
 
     /// How it was a moment ago.
     pub fn link(&self) -> ClientLink {
         self.shared.seen.get()
+    }
+
+    /// Counters of its replicas.
+    pub fn replicas(&self) -> &LineCounts {
+        &self.counts
     }
 
     /// Whether its thread still runs.
@@ -257,7 +222,14 @@ impl ClientThread {
     fn sleep(&mut self, until_ns: u64) {
         let deadline = Instant::now() + Duration::from_nanos(until_ns.saturating_sub(monotonic_ns()));
         let shared = &self.shared;
-        self.watches.wait_any(&mut [&mut self.mailbox], Some(deadline), || shared.ends.load(Ordering::Acquire));
+        let ends = || shared.ends.load(Ordering::Acquire);
+        let Some(line) = &mut self.reporter.line else {
+            self.watches.wait_any(&mut [&mut self.mailbox], Some(deadline), ends);
+            return;
+        };
+        let mut sources: Vec<&mut dyn Source> = vec![&mut self.mailbox];
+        sources.extend(line.readers().map(|reader| reader as &mut dyn Source));
+        self.watches.wait_any(&mut sources, Some(deadline), ends);
     }
 
     fn connect(&mut self, now_ns: u64) {

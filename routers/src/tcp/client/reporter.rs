@@ -1,9 +1,10 @@
 //! What a client does for its session: it delivers, answers, and says what happens.
 
+use crate::replication::LineReplicas;
 use crate::report::NotDelivered;
 use crate::session::client::{ClientEvent, ClientHost};
 use crate::session::frame::Carried;
-use crate::session::{Cause, ErrorReplies};
+use crate::session::{Cause, ErrorReplies, ReplicaEnd};
 use crate::shell::sender_cache::SenderCache;
 use crate::tcp::fault_writer::FaultWriter;
 use crate::tcp::snapshots::Outage;
@@ -20,11 +21,13 @@ pub(super) struct EventReporter {
     /// The server has said that, or what it said is why.
     by_server: bool,
     pub(super) outage: Outage,
+    pub(super) line: Option<LineReplicas>,
 }
 
 impl EventReporter {
     pub(super) fn new(server: SocketAddr, sender_cache: SenderCache, fault_writer: FaultWriter) -> Self {
-        Self { server, sender_cache, fault_writer, why: String::new(), by_server: false, outage: Outage::default() }
+        let (why, outage) = Default::default();
+        Self { server, sender_cache, fault_writer, why, by_server: false, outage, line: None }
     }
 
     /// Says once why the server is not there. `was_made`: the connection was.
@@ -44,6 +47,12 @@ impl EventReporter {
     fn says(&mut self, why: String, by_server: bool) {
         tracing::warn!("{why}");
         (self.why, self.by_server) = (why, by_server);
+    }
+}
+
+impl ReplicaEnd for EventReporter {
+    fn replicas(&mut self) -> Option<&mut LineReplicas> {
+        self.line.as_mut()
     }
 }
 

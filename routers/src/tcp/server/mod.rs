@@ -4,26 +4,30 @@
 //! client's own queue.
 
 mod accept;
+mod parts;
 mod reporter;
 
+pub use parts::{ServerError, ServerParts};
+
 use super::fault_writer::FaultWriter;
+use super::replicas::LineCounts;
 use super::seal::{Holder, ServerSeal};
 use super::snapshots::{Class, HOSTS_MAX, LatestValue, MEMBERS_MAX, MemberSnapshot, Members, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
-use crate::session::server::{Names, Rights, Server, ServerSettings, ServerStep, View};
+use crate::session::server::{Names, Rights, Server, ServerStep, View};
 use crate::session::{Cause, ClientIndex};
-use crate::shell::Faults;
 use accept::{listen, raise_descriptors};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
 use reporter::ServerReporter;
-use rohrpost_mailbox::{Node, SystemClock, monotonic_ns};
+use rohrpost_mailbox::{Interest, Name, Participant, SystemClock, Watches, monotonic_ns};
 use std::collections::BTreeMap;
 use std::io;
-use std::net::{SocketAddr, TcpListener};
+use std::net::TcpListener;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// Read from one client before the others have their turn.
 const PIECE_BYTES: usize = 64 * 1024;
@@ -34,48 +38,10 @@ const DESCRIPTORS_BESIDE: u64 = 256;
 const LISTENER: u64 = u64::MAX;
 const BELL: u64 = u64::MAX - 1;
 
-/// Why the TCP router does not run.
-#[derive(Debug, thiserror::Error)]
-pub enum ServerError {
-    /// Somebody is there.
-    #[error(
-        "{0} is in use: does the TCP router run already, or another program? Stop it, or choose another `port` in [tcp]"
-    )]
-    InUse(SocketAddr),
-    /// It is another computer's address.
-    #[error(
-        "{0} is no address of this computer: let `server` of [tcp] name the node that has it, or correct `address` \
-         (`ip addr` shows which there are)"
-    )]
-    NotHere(SocketAddr),
-    /// The system says no for another reason.
-    #[error("{1} for {0}: {2}")]
-    Io(SocketAddr, &'static str, io::Error),
-    /// The system has no thread for it.
-    #[error("a thread of the TCP router: {0}; is the limit of processes reached (ulimit -u)?")]
-    Thread(io::Error),
-}
-
-/// Parts of a server.
-pub struct ServerParts<'a> {
-    /// Where it listens.
-    pub address: SocketAddr,
-    /// What it knows.
-    pub settings: ServerSettings,
-    /// How commands are answered that cannot be handed on.
-    pub faults: Arc<dyn Faults>,
-    /// Its certificates; none: nothing is sealed, and no client proves its identity.
-    pub seal: Option<ServerSeal>,
-    /// What each node of its own system hosts, by its configuration: no certificate lets one register more. Of other
-    /// systems it knows nothing.
-    pub names: BTreeMap<String, Names>,
-    /// The node that it takes system time from.
-    pub node: &'a Arc<Node>,
-}
-
 /// The TCP router at work; dropped, it tells its clients and ends.
 pub struct ServerShell {
     shared: Arc<ServerShared>,
+    counts: LineCounts,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -92,7 +58,7 @@ impl ServerShell {
     /// # Errors
     /// [`ServerError`]
     pub fn start(parts: ServerParts<'_>) -> Result<Self, ServerError> {
-        let ServerParts { address, settings, faults, seal, names, node } = parts;
+        let ServerParts { address, settings, faults, seal, names, node, replicas } = parts;
         let own = settings.system.map(|(system, _)| system);
         let io = |doing| move |error: io::Error| ServerError::Io(address, doing, error);
         raise_descriptors(u64::from(settings.clients_max) + u64::from(settings.handshakes_max) + DESCRIPTORS_BESIDE);
@@ -107,10 +73,20 @@ impl ServerShell {
         watch(&epoll).map_err(|errno| io("epoll")(errno.into()))?;
         let shared = Arc::new(ServerShared { ends: AtomicBool::new(false), bell, seen: LatestValue::default() });
         let fault_writer = FaultWriter::new(faults, format!("beyond the TCP router at {address}"));
+        let mut host = ServerReporter::new(fault_writer);
+        let mut watches = None;
+        if let Some(parts) = replicas {
+            let participant = Participant::join(node, Name::NONE)?;
+            let mut all = Watches::new(&participant).map_err(io("what wakes it"))?;
+            all.add(&epoll.0, Interest::Read).map_err(io("what wakes it"))?;
+            watches = Some(all);
+            host.line = Some(parts.start(node, participant));
+        }
+        let counts = LineCounts::of(host.line.as_ref());
         let work = ServerThread {
             shared: shared.clone(),
             server: Server::new(settings),
-            host: ServerReporter::new(fault_writer),
+            host,
             seal,
             own,
             names,
@@ -118,17 +94,23 @@ impl ServerShell {
             listener,
             accept_ns: None,
             epoll,
+            watches,
             connections: Vec::new(),
             clock: SystemClock::open(node),
             piece: vec![0; PIECE_BYTES].into(),
         };
         let thread = std::thread::Builder::new().name("tcp-router".into()).spawn(move || work.run());
-        Ok(Self { shared, thread: Some(thread.map_err(ServerError::Thread)?) })
+        Ok(Self { shared, counts, thread: Some(thread.map_err(ServerError::Thread)?) })
     }
 
     /// How it was a moment ago.
     pub fn members(&self) -> Members {
         self.shared.seen.get()
+    }
+
+    /// Counters of its replicas.
+    pub fn replicas(&self) -> &LineCounts {
+        &self.counts
     }
 
     /// Whether its thread still runs.
@@ -172,6 +154,8 @@ struct ServerThread {
     /// There is no descriptor left: nothing is accepted before, ns.
     accept_ns: Option<u64>,
     epoll: Epoll,
+    /// Where it has replicas: wakes it for records as well, and watches `epoll`.
+    watches: Option<Watches>,
     /// By client.
     connections: Vec<Option<ServerConnection>>,
     clock: SystemClock,
@@ -203,7 +187,13 @@ impl ServerThread {
                 self.server.end(now_ns, &mut self.host);
             }
             match self.server.poll(now_ns, &mut self.host) {
-                ServerStep::Write(client) => self.write(client),
+                ServerStep::Write(client) => {
+                    self.write(client);
+                    // However many parts there are to send, what comes has its turn.
+                    if self.watches.is_some() {
+                        self.look(&mut events, EpollTimeout::ZERO);
+                    }
+                }
                 ServerStep::Close(client) => self.close(client),
                 ServerStep::Wait { .. } if ending && self.connections.iter().all(Option::is_none) => return,
                 ServerStep::Wait { until_ns } => self.sleep(&mut events, until_ns.min(say_ns)),
@@ -213,7 +203,18 @@ impl ServerThread {
 
     fn sleep(&mut self, events: &mut [EpollEvent], until_ns: u64) {
         let wait_ns = until_ns.saturating_sub(monotonic_ns());
-        let timeout = EpollTimeout::try_from(wait_ns.div_ceil(1_000_000)).unwrap_or(EpollTimeout::ZERO);
+        let Some((watches, line)) = self.watches.as_mut().zip(self.host.line.as_mut()) else {
+            let timeout = EpollTimeout::try_from(wait_ns.div_ceil(1_000_000)).unwrap_or(EpollTimeout::ZERO);
+            return self.look(events, timeout);
+        };
+        let mut readers: Vec<_> = line.readers().collect();
+        watches.wait_any(&mut readers, Duration::from_nanos(wait_ns), || false);
+        while watches.next_ready().is_some() {}
+        self.look(events, EpollTimeout::ZERO);
+    }
+
+    /// Handles what happened to its sockets, or happens within a time.
+    fn look(&mut self, events: &mut [EpollEvent], timeout: EpollTimeout) {
         // Interrupted by a signal, it looks again.
         let count = self.epoll.wait(events, timeout).unwrap_or(0);
         for event in &events[..count] {

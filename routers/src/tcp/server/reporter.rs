@@ -1,8 +1,9 @@
 //! Reports of the TCP router: refusals to senders of commands that go no further, and lines for people.
 
+use crate::replication::LineReplicas;
 use crate::session::frame::SessionRefusalReason;
 use crate::session::server::{ServerEvent, ServerHost};
-use crate::session::{Cause, ErrorReplies};
+use crate::session::{Cause, ErrorReplies, ReplicaEnd};
 use crate::tcp::fault_writer::FaultWriter;
 use crate::tcp::line_throttle::{LineThrottle, Topic};
 use rohrpost_mailbox::monotonic_ns;
@@ -17,11 +18,13 @@ pub(super) struct ServerReporter {
     pub(super) refused: u64,
     /// The last of them, in words.
     pub(super) refusal: String,
+    pub(super) line: Option<LineReplicas>,
 }
 
 impl ServerReporter {
     pub(super) fn new(fault_writer: FaultWriter) -> Self {
-        Self { fault_writer, throttle: LineThrottle::default(), left: 0, refused: 0, refusal: String::new() }
+        let (throttle, refusal) = Default::default();
+        Self { fault_writer, throttle, left: 0, refused: 0, refusal, line: None }
     }
 
     /// Says and keeps why one may not take part.
@@ -56,6 +59,12 @@ fn tell(topic: Topic, line: &str) {
         Topic::Joined | Topic::Left(None) => tracing::info!("{line}"),
         Topic::Left(Some(SessionRefusalReason::Ending)) => tracing::debug!("{line}"),
         _ => tracing::warn!("{line}"),
+    }
+}
+
+impl ReplicaEnd for ServerReporter {
+    fn replicas(&mut self) -> Option<&mut LineReplicas> {
+        self.line.as_mut()
     }
 }
 

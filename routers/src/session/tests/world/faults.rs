@@ -63,6 +63,7 @@ impl World {
         self.check_server(false);
         self.server_incarnation += 2;
         self.server = Server::new(server_settings(self.server_incarnation));
+        self.rings.iter_mut().for_each(|rings| rings.server.restart());
         self.server_wake_ns = 0;
         self.server_down_until_ns = self.now_ns + self.faults.between(0, 1500) * MS;
         let is_told = self.faults.percent(70);
@@ -79,6 +80,7 @@ impl World {
         node.incarnation += 2;
         let now_ns = node.clock.at(self.now_ns).monotonic_ns;
         node.client = Client::new(client_settings(index, node.incarnation), ranges(index), now_ns);
+        self.rings.iter_mut().for_each(|rings| rings.clients[index].restart());
         node.wake_ns = 0;
         self.oracle.clients[index].up_ns = None;
         let is_told = self.faults.percent(50);

@@ -1,6 +1,7 @@
 //! A server, its clients and the lines between them, in virtual time from a seed.
 
 mod faults;
+pub(super) mod rings;
 mod streams;
 
 use super::oracle::{Known, SessionOracle, Teller};
@@ -9,6 +10,7 @@ use crate::admission::capped;
 use crate::session::LOOK_EVERY_NS;
 use crate::session::client::{self, Client, ClientPackage};
 use crate::session::server::{self, Server};
+use rings::AllRings;
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Options, Priority, TimeRecord, TimeSource, Type};
 use rohrpost_testbed::sim::chance::Chance;
 use rohrpost_testbed::sim::clock::Clock;
@@ -43,6 +45,8 @@ pub(super) struct World {
     server_wake_ns: u64,
     pub(super) nodes: Vec<Node>,
     connections: Vec<Connection>,
+    /// Streams and their replicas, if the plan has some.
+    pub(super) rings: Option<AllRings>,
     faults: Chance,
     posts: Chance,
     host: Chance,
@@ -79,6 +83,7 @@ impl World {
             server_wake_ns: 0,
             nodes,
             connections: Vec::new(),
+            rings: plan.has_replicas.then(|| AllRings::new(plan.clients)),
             faults: chance.fork(),
             posts: chance.fork(),
             host: chance.fork(),
@@ -95,6 +100,7 @@ impl World {
             self.oracle.now_ns = self.now_ns;
             self.fail();
             self.post();
+            self.turn_rings();
             self.carry();
             self.poll_server();
             (0..self.nodes.len()).for_each(|index| self.poll_client(index));
@@ -200,7 +206,8 @@ impl World {
         self.oracle.saw("posted");
         let node = &mut self.nodes[from];
         let now_ns = node.clock.at(self.now_ns).monotonic_ns;
-        let mut teller = Teller { oracle: &mut self.oracle, client: from, chance: &mut node.chance };
+        let line = self.rings.as_mut().map(|rings| &mut rings.clients[from].line);
+        let mut teller = Teller { oracle: &mut self.oracle, client: from, chance: &mut node.chance, line };
         node.client.send(now_ns, &ClientPackage { head, body: &body, published_ns: now_ns, hops: 0 }, &mut teller);
         node.wake_ns = 0;
         number
@@ -212,7 +219,9 @@ impl World {
             return;
         }
         loop {
-            let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host };
+            let written = self.rings.as_ref().map(AllRings::written);
+            let line = self.rings.as_mut().map(|rings| &mut rings.server.line);
+            let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host, line };
             let (server, connections) = (&mut self.server, &mut self.connections);
             let find = |index| move |connection: &&mut Connection| connection.index == Some(index);
             match server.poll(now_ns, &mut teller) {
@@ -220,6 +229,9 @@ impl World {
                     let Some(connection) = connections.iter_mut().find(find(index)) else { break };
                     let count = connection.down.write(self.now_ns, server.ready(index));
                     connection.was_down_full = count < server.ready(index).len();
+                    if let Some(written) = written {
+                        connection.tap.took(&server.ready(index)[..count], written, teller.oracle);
+                    }
                     server.took(now_ns, index, count);
                 }
                 server::ServerStep::Close(index) => {
@@ -243,7 +255,8 @@ impl World {
         }
         loop {
             let node = &mut self.nodes[index];
-            let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
+            let line = self.rings.as_mut().map(|rings| &mut rings.clients[index].line);
+            let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance, line };
             let open = |connection: &&mut Connection| connection.client == index && connection.is_client_open;
             match node.client.poll(now_ns, &mut teller) {
                 client::ClientStep::Connect => self.connect(index),

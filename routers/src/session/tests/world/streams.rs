@@ -2,6 +2,7 @@
 
 use super::S;
 use super::World;
+use super::rings::Tap;
 use crate::session::ClientIndex;
 use crate::session::tests::oracle::Teller;
 use crate::session::tests::pipe::Pipe;
@@ -17,6 +18,8 @@ pub(super) struct Connection {
     pub(super) down: Pipe,
     pub(super) was_up_full: bool,
     pub(super) was_down_full: bool,
+    /// What the server has sent.
+    pub(super) tap: Tap,
 }
 
 impl World {
@@ -31,7 +34,8 @@ impl World {
     fn carry_up(&mut self, at: usize) {
         let connection = &mut self.connections[at];
         let now_ns = self.server_clock.at(self.now_ns).monotonic_ns;
-        let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host };
+        let line = self.rings.as_mut().map(|rings| &mut rings.server.line);
+        let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host, line };
         while let Some(index) = connection.index {
             let Some(bytes) = connection.up.read(self.now_ns) else { break };
             self.server.received(now_ns, index, &bytes, &mut teller);
@@ -57,7 +61,8 @@ impl World {
             return;
         }
         let now_ns = node.clock.at(self.now_ns).monotonic_ns;
-        let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
+        let line = self.rings.as_mut().map(|rings| &mut rings.clients[index].line);
+        let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance, line };
         while let Some(bytes) = connection.down.read(self.now_ns) {
             node.client.received(now_ns, &bytes, &mut teller);
             node.wake_ns = 0;
@@ -79,11 +84,13 @@ impl World {
         node.attempts += 1;
         let now_ns = node.clock.at(self.now_ns).monotonic_ns;
         let is_there = self.now_ns >= self.server_down_until_ns;
-        let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host };
+        let line = self.rings.as_mut().map(|rings| &mut rings.server.line);
+        let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host, line };
         let from = address(index, node.attempts);
         let place = self.server_clock.at(self.now_ns).monotonic_ns;
         let Some(place) = is_there.then(|| self.server.accept(place, from, &mut teller)).flatten() else {
-            let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
+            let line = self.rings.as_mut().map(|rings| &mut rings.clients[index].line);
+            let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance, line };
             return node.client.closed(now_ns, &mut teller);
         };
         let line = self.plan.lines[index];
@@ -94,6 +101,10 @@ impl World {
         }
         if self.plan.flooder.is_some_and(|flooder| flooder != index) {
             down = down.holding(8 * 1024);
+        }
+        if self.plan.holds_little {
+            down = down.holding(8 * 1024);
+            up = up.holding(8 * 1024);
         }
         if self.plan.stalled == Some(index) && self.now_ns >= S {
             down.stalled_until_ns = u64::MAX;
@@ -110,6 +121,7 @@ impl World {
             down,
             was_up_full: false,
             was_down_full: false,
+            tap: Tap::default(),
         });
     }
 }

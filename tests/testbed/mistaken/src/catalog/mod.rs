@@ -2,6 +2,7 @@
 
 mod carrying;
 mod lan;
+mod line;
 pub mod planted;
 mod rejecting;
 mod replicas;
@@ -18,6 +19,7 @@ pub const GROUPS: &[Group] = &[
     lan::CROWDED,
     lan::FORGED,
     lan::LAN,
+    line::LINE,
     rejecting::REJECTING,
     replicas::REPLICAS,
     session::SESSION,

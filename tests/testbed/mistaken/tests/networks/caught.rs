@@ -161,4 +161,4 @@ pub(crate) const UNSEEN: &[(Mistake, &str)] = &[
 ];
 
 /// Groups of mistakes of sessions and of replicas, which no simulated network has.
-pub(crate) const UNSEEN_GROUPS: [&str; 3] = ["SESSION", "FOLLOWER", "REPLICAS"];
+pub(crate) const UNSEEN_GROUPS: [&str; 4] = ["SESSION", "FOLLOWER", "REPLICAS", "LINE"];

@@ -1,0 +1,138 @@
+//! By a session: one record leaves, the newest is next, and sampling is as on the LAN.
+
+use super::{CAMERA, FirstByte, Ground, ID, SHAPE, at, image, time, words};
+use crate::frame::{DescriptionPart, FrameKind, NodeIndex, RecordPart, ReplicaFrame};
+use crate::harness::{MS, START};
+use crate::replication::{LINE_PART_ROOM, LineReplicas, LineSettings, ReplicaLoss, ReplicaSettings};
+use rohrpost_config::Sampling;
+use rohrpost_mailbox::{Missed, Next, StreamReader, StreamWriter};
+use std::sync::Arc;
+
+const SERVER: NodeIndex = 0;
+const LAPTOP: NodeIndex = 1;
+
+/// A line to a laptop.
+struct Line {
+    here: LineReplicas,
+    there: LineReplicas,
+    writer: StreamWriter,
+    reader: StreamReader,
+    now_ns: u64,
+    written: u64,
+    _grounds: [Ground; 2],
+}
+
+impl Line {
+    fn new(replica: ReplicaSettings) -> Self {
+        let replica = |to| ReplicaSettings { node: SERVER, to, ..replica.clone() };
+        let grounds = [Ground::new(), Ground::new()];
+        let end = |own: NodeIndex, sent, received| {
+            let (sent, received) = (vec![replica(sent)], vec![replica(received)]);
+            let settings = LineSettings { own, server: SERVER, nodes: Vec::new(), sent, received };
+            let participant = grounds[usize::from(own)].join();
+            LineReplicas::new(&settings, participant, Arc::new(FirstByte), Box::new(time))
+        };
+        let (here, there) = (end(SERVER, 1 << LAPTOP, 0), end(LAPTOP, 0, 1 << LAPTOP));
+        grounds[0].join().describe_replicas(CAMERA, &words(1)).unwrap();
+        let writer = grounds[0].join().stream_writer(ID, SHAPE).unwrap();
+        let reader = grounds[1].join().stream_reader(ID).unwrap();
+        let mut line = Self { here, there, writer, reader, now_ns: START, written: 0, _grounds: grounds };
+        line.here.refresh(START);
+        line.here.came(START, LAPTOP);
+        line
+    }
+
+    /// Writes these, one each millisecond.
+    fn write(&mut self, bodies: &[&[u8]]) {
+        for body in bodies {
+            self.now_ns += MS;
+            self.writer.write(at(100 + self.written), body).unwrap();
+            self.written += 1;
+        }
+    }
+
+    /// The next part arrives, if there is one.
+    fn carry_one(&mut self) -> bool {
+        let mut content = [0; LINE_PART_ROOM];
+        self.here.refresh(self.now_ns);
+        let Some((kind, length)) = self.here.next(self.now_ns, LAPTOP, &mut content) else { return false };
+        let part = match kind {
+            FrameKind::RecordPart => ReplicaFrame::Record(RecordPart::parse(&content[..length]).unwrap()),
+            _ => ReplicaFrame::Description(DescriptionPart::parse(&content[..length]).unwrap()),
+        };
+        self.there.take(self.now_ns, (Some(SERVER), 7), &part);
+        true
+    }
+
+    /// All that leaves arrives; the sequences of what can be read then.
+    fn carry(&mut self) -> Vec<u64> {
+        while self.carry_one() {}
+        let mut all = Vec::new();
+        loop {
+            match self.reader.try_next().unwrap() {
+                Next::Record(record) => all.push(record.info().sequence),
+                Next::Lost(_) => {}
+                Next::Nothing => return all,
+            }
+        }
+    }
+
+    /// Records that were left out by sampling, and passed over for newer ones.
+    fn left_out(&self) -> [u64; 2] {
+        let counts = self.here.counts().sent[0].clone();
+        [ReplicaLoss::Sampled, ReplicaLoss::Passed].map(|cause| counts.lost.of(cause))
+    }
+}
+
+#[test]
+fn the_newest_of_what_waits_leaves_and_what_sampling_leaves_out_is_told_apart() {
+    let burst: Vec<&[u8]> = vec![b"picture"; 6];
+    for (sampling, changed, first, second, left_out) in [
+        (Sampling::Each, false, vec![5], vec![11], [0, 10]),
+        // Of 6 to 11 every third is 6 and 9.
+        (Sampling::Every(3), false, vec![5], vec![9], [4, 6]),
+        (Sampling::Rate(1.0), false, vec![5], vec![], [6, 5]),
+        (Sampling::Each, true, vec![5], vec![], [1, 10]),
+    ] {
+        let mut line = Line::new(ReplicaSettings { sampling, changed, ..image() });
+        line.write(&burst);
+        assert_eq!(line.carry(), first, "{sampling}, changed: {changed}");
+        line.write(&burst);
+        assert_eq!(line.carry(), second, "{sampling}, changed: {changed}");
+        assert_eq!(line.left_out(), left_out, "{sampling}, changed: {changed}");
+    }
+    let mut line = Line::new(ReplicaSettings { sampling: Sampling::Every(3), ..image() });
+    let sequences: Vec<u64> = (0..10)
+        .flat_map(|_| {
+            line.write(&[b"picture"]);
+            line.carry()
+        })
+        .collect();
+    assert_eq!(sequences, [0, 3, 6, 9]);
+    assert_eq!(line.reader.missed(), Missed { lost: 0, sampled: 6, passed_over: 0 });
+}
+
+#[test]
+fn what_leaves_is_held_and_a_new_connection_begins_with_the_newest() {
+    let mut line = Line::new(image());
+    line.carry();
+    line.write(&[&[1; 6000]]);
+    assert!(line.carry_one());
+    // The ring turns, more than once.
+    for _ in 0..40 {
+        line.write(&[&[2; 6000]]);
+    }
+    assert_eq!(line.carry(), [0, 40], "the one that was begun, and the newest");
+    line.write(&[&[3; 6000]]);
+    assert!(line.carry_one());
+    for end in [&mut line.here, &mut line.there] {
+        end.left(line.now_ns, LAPTOP);
+        end.left(line.now_ns, SERVER);
+    }
+    line.write(&[&[4; 6000]]);
+    assert_eq!(line.carry(), [], "nothing leaves without a connection");
+    line.here.came(line.now_ns, LAPTOP);
+    assert_eq!(line.carry(), [42]);
+    let received = line.there.counts().received[0].clone();
+    assert_eq!((received.records.get(), received.lost.of(ReplicaLoss::Incomplete)), (3, 1));
+}

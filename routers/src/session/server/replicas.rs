@@ -1,0 +1,55 @@
+//! Replicas of nodes that are clients. A node is the client that hosts its name, `tcp.I`: so what lets nobody take a
+//! name lets nobody read, or write, what is another node's.
+
+use super::{Server, ServerHost};
+use crate::frame::ReplicaFrame;
+use crate::session::ClientIndex;
+use crate::session::parts::add_part;
+
+impl Server {
+    /// Clients for which a record waits have something to do.
+    pub(super) fn look_for_parts(&mut self, now_ns: u64, host: &mut impl ServerHost) {
+        let Some(replicas) = host.replicas() else { return };
+        replicas.refresh(now_ns);
+        for (node, name) in replicas.nodes() {
+            if let Some(client) = self.table.client_of(*name).filter(|_| replicas.waits_for(*node)) {
+                self.member_mut(client).into_iter().for_each(|member| member.has_parts = true);
+                self.is_due(client);
+            }
+        }
+    }
+
+    /// Makes the next part for a client ready, if nothing else is.
+    pub(super) fn add_part(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) {
+        let Some(member) = self.member_mut(client).filter(|member| member.has_parts && member.is_member()) else {
+            return;
+        };
+        if let Some(node) = member.node.filter(|_| member.outgoing.ready().is_empty()) {
+            member.has_parts = add_part(&mut member.outgoing, now_ns, node, host);
+        }
+    }
+
+    /// A client may host other names now: it may be a node by now, or may have been one.
+    pub(super) fn look_at_node(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) {
+        let Some(replicas) = host.replicas() else { return };
+        let is_its = |name| self.table.client_of(name) == Some(client);
+        let node = replicas.nodes().iter().find(|(_, name)| is_its(*name)).map(|(node, _)| *node);
+        let Some(member) = self.member_mut(client).filter(|member| member.node != node) else { return };
+        member.has_parts = false;
+        let before = std::mem::replace(&mut member.node, node);
+        before.into_iter().for_each(|before| replicas.left(now_ns, before));
+        node.into_iter().for_each(|node| replicas.came(now_ns, node));
+    }
+
+    /// Takes a part that a client sends.
+    pub(super) fn take_part(
+        &mut self,
+        now_ns: u64,
+        client: ClientIndex,
+        part: &ReplicaFrame<'_>,
+        host: &mut impl ServerHost,
+    ) {
+        let Some((replicas, member)) = host.replicas().zip(self.member(client)) else { return };
+        replicas.take(now_ns, (member.node, member.incarnation), part);
+    }
+}
