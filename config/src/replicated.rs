@@ -11,10 +11,10 @@ impl Replica {
         format!("{}/{}", installation.classes.format(self.from), self.item)
     }
 
-    /// The level on which it leaves: that of the class of the process that writes it.
+    /// The level on which it leaves: that of the class under which it is written. One process may write a pose and a
+    /// picture, and has a name of a class for each: the pose does not wait for the picture.
     pub fn level(&self, installation: &Installation) -> u8 {
-        let class = installation.module(self.from).map_or(self.from, |module| module.name).class();
-        installation.network.map_or(0, |network| network.level(class.priority()))
+        installation.network.map_or(0, |network| network.level(self.from.class().priority()))
     }
 
     /// The shape that the stream has on each node.
@@ -31,6 +31,18 @@ impl Installation {
             replica.from == from.module() && replica.item == item && replica.to.iter().any(|to| to == node)
         };
         self.replicas.iter().find(is_it)
+    }
+
+    /// What to write, so that a node has a replica of a stream that another one writes.
+    pub fn replica_remedy(&self, node: &str, from: Name, item: &str) -> String {
+        let known = self.replicas.iter().find(|replica| replica.from == from.module() && replica.item == item);
+        match known {
+            Some(replica) => format!("add \"{node}\" to `to` of the [[replica]] in line {}", replica.line),
+            None => {
+                let stream = format!("{}/{item}", self.classes.format(from.module()));
+                format!("add a [[replica]] with `stream = \"{stream}\"` and `to = [\"{node}\"]`")
+            }
+        }
     }
 
     /// What must be equal on all nodes: the place of a replica is its number on the wire.

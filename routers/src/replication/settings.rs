@@ -26,7 +26,7 @@ pub struct ReplicaSettings {
     pub delay_alarm_ns: u64,
     /// Lost parts are asked for until nothing came of a record for so long, ns; 0: never.
     pub deadline_ns: u64,
-    /// The level on which they are sent: that of the writer's class.
+    /// The level on which they are sent: that of the class of `from`.
     pub level: u8,
 }
 
