@@ -12,6 +12,7 @@ mod losses;
 mod masters;
 mod nodes;
 mod recording;
+mod replicas;
 mod sealed_capture;
 mod takeover;
 

@@ -12,6 +12,9 @@ pub const ROUTER: &str = "router";
 /// Class of the TCP router and of its clients, which are implicit with `[tcp]`.
 pub const TCP: &str = "tcp";
 
+/// Class of the modules that draw.
+pub const GUI: &str = "gui";
+
 /// One class of an installation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClassEntry {

@@ -75,7 +75,7 @@ mod time;
 mod units;
 
 pub use access::Access;
-pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TCP, TOOL};
+pub use classes::{ClassEntry, ClassTable, GUI, NameTextError, ROUTER, TCP, TOOL};
 pub use contents::{Contents, ContentsError};
 pub use digest::Digest;
 pub use errors::{Errors, Problem, SettingsError};

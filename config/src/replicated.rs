@@ -12,14 +12,15 @@ impl Replica {
         format!("{}/{}", installation.classes.format(self.from), self.item)
     }
 
-    /// The priority with which it leaves: that of the class of the process that writes it.
-    pub fn priority(&self, installation: &Installation) -> Priority {
-        installation.module(self.from).map_or(self.from, |module| module.name).class().priority()
+    /// The priority with which it leaves: that of the class under which it is written. One process may write a pose and
+    /// a picture, and has a name of a class for each: the pose does not wait for the picture.
+    pub fn priority(&self) -> Priority {
+        self.from.class().priority()
     }
 
     /// The level of that on the LAN.
     pub fn level(&self, installation: &Installation) -> u8 {
-        installation.network.map_or(0, |network| network.level(self.priority(installation)))
+        installation.network.map_or(0, |network| network.level(self.priority()))
     }
 
     /// The shape that the stream has on each node.
@@ -63,6 +64,18 @@ impl Installation {
         let first = self.tcp_server_with(replica).filter(|_| is_beyond(&writer)).map(|server| (writer, vec![server]));
         let hops = first.into_iter().chain([(server, others)]);
         hops.filter(|(_, to): &(&str, Vec<&str>)| !to.is_empty()).collect()
+    }
+
+    /// What to write, so that a node has a replica of a stream that another one writes.
+    pub fn replica_remedy(&self, node: &str, from: Name, item: &str) -> String {
+        let known = self.replicas.iter().find(|replica| replica.from == from.module() && replica.item == item);
+        match known {
+            Some(replica) => format!("add \"{node}\" to `to` of the [[replica]] in line {}", replica.line),
+            None => {
+                let stream = format!("{}/{item}", self.classes.format(from.module()));
+                format!("add a [[replica]] with `stream = \"{stream}\"` and `to = [\"{node}\"]`")
+            }
+        }
     }
 
     /// What must be equal on all nodes: the place of a replica is its number on the wire.

@@ -61,10 +61,15 @@ pub struct Tab {
 #[derive(Clone)]
 enum Panel {
     Plane(Vec<String>),
-    Space { origin: EntityPath, contents: Vec<String> },
+    Space {
+        origin: EntityPath,
+        contents: Vec<String>,
+    },
     Curves(String),
     CurvesAndLines(String),
     Own(Arc<dyn Fn() -> ContainerLike + Send + Sync>),
+    /// The first, and below it curves of this name and origin.
+    Over(Box<Panel>, String, EntityPath),
 }
 
 impl Tab {
@@ -97,6 +102,12 @@ impl Tab {
     /// Anything that Rerun's blueprints offer, see [`rerun::blueprint`]. Give the view the same name.
     pub fn own<T: Into<ContainerLike>>(name: &str, view: impl Fn() -> T + Send + Sync + 'static) -> Self {
         Self::new(name, Panel::Own(Arc::new(move || view().into())))
+    }
+
+    /// The same under another name, with curves of all numbers below an entity under it.
+    #[must_use]
+    pub(crate) fn over_curves(self, name: String, curves: String, origin: EntityPath) -> Self {
+        Self { name, panel: Panel::Over(Box::new(self.panel), curves, origin), ..self }
     }
 
     /// The same in the column beside the world, where it is seen at once. Of more than three there, the first share the
@@ -180,6 +191,10 @@ impl Draft {
     }
 
     fn tab(&mut self, Tab { name, panel, .. }: &Tab) -> ContainerLike {
+        self.panel(name, panel)
+    }
+
+    fn panel(&mut self, name: &str, panel: &Panel) -> ContainerLike {
         match panel {
             Panel::Plane(contents) => self.plane(name, contents),
             Panel::Space { origin, contents } => self.space(name, origin, contents),
@@ -188,9 +203,15 @@ impl Draft {
                 self.chart(&format!("{name}: numbers"), origin, true),
                 self.lines(&format!("{name}: text"), origin),
             ])
-            .with_name(name.as_str())
+            .with_name(name)
             .into(),
             Panel::Own(view) => view(),
+            Panel::Over(panel, curves, origin) => {
+                Vertical::new([self.panel(name, panel), self.chart(curves, &origin.to_string(), false)])
+                    .with_row_shares([3.0, 1.0])
+                    .with_name(name)
+                    .into()
+            }
         }
     }
 

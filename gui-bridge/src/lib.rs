@@ -5,8 +5,8 @@
 //!   records  ──▶ (a module's thread, never waits)    │   (a separate thread; the StreamSupervisor can stop it)
 //! ```
 //!
-//! Records are those of large streams, pictures say: they are too large for packages, and are read where they lie. Each
-//! is copied into the store and released at once.
+//! Records are those of large streams, pictures say, and of replicas: they are too large for packages, or are here
+//! already, and are read where they lie. Each is copied into the store and released at once.
 //!
 //! A [`View`] says what is drawn of modules of a class; [`run_with`] makes a bridge with views of one's own. A
 //! [`Scene`] does not use mailboxes: its caller receives packages and calls one method for each. Only this crate uses
@@ -35,6 +35,7 @@ mod nodes;
 mod palette;
 mod pictures;
 mod points;
+mod replicas;
 mod ring;
 mod scene;
 mod sink;

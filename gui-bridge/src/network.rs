@@ -31,21 +31,43 @@ const NODE: palette::Rgb = [86, 180, 233];
 /// A router tells how it is twice a second; what it told so long ago is no news.
 const OLD: Duration = Duration::from_secs(3);
 
-/// The tab of both views.
+/// Charts of packages, links and clocks: name and entity of each.
+const PACKAGES: [(&str, &str); 4] = [
+    ("Packages per second, by link", "network/packages"),
+    ("Counted of links since start", "network/counters"),
+    ("Clock error bound, µs", "network/clock"),
+    ("Waits by class and hop, µs: 99 of 100", "network/latency"),
+];
+/// Charts of replicas.
+const RECORDS: [(&str, &str); 3] = [
+    ("Records per second, by replica", "network/records"),
+    ("Not in replicas since start, by cause", "network/records lost"),
+    ("Delay of records, ms", "network/delay"),
+];
+
+/// The tab of links and clocks.
 pub(crate) fn tab() -> Tab {
+    Tab::own("Network", || Horizontal::new([graph(), charts(&PACKAGES)]).with_name("Network"))
+}
+
+/// The same where there are replicas, too.
+pub(crate) fn tab_with_replicas() -> Tab {
     Tab::own("Network", || {
-        let chart =
-            |name: &str, origin: &str| -> ContainerLike { TimeSeriesView::new(name).with_origin(origin).into() };
-        let charts = Vertical::new([
-            chart("Packages per second, by link", "network/packages"),
-            chart("Counted of links since start", "network/counters"),
-            chart("Clock error bound, µs", "network/clock"),
-            chart("Waits by class and hop, µs: 99 of 100", "network/latency"),
-        ]);
-        Horizontal::new([GraphView::new("Nodes and links").with_origin("network/graph").into(), charts.into()])
-            .with_column_shares([1.0, 1.0])
-            .with_name("Network")
+        let charts = Horizontal::new([charts(&PACKAGES), charts(&RECORDS)]);
+        Horizontal::new([graph(), charts.into()]).with_column_shares([2.0, 3.0]).with_name("Network")
     })
+}
+
+fn graph() -> ContainerLike {
+    GraphView::new("Nodes and links").with_origin("network/graph").into()
+}
+
+fn charts(charts: &[(&str, &str)]) -> ContainerLike {
+    let chart = |(name, origin): &(&str, &str)| -> ContainerLike {
+        let parts: Vec<&str> = origin.split('/').collect();
+        TimeSeriesView::new(*name).with_origin(entity(&parts)).into()
+    };
+    Vertical::new(charts.iter().map(chart).collect::<Vec<_>>()).into()
 }
 
 /// Links, as all routers see theirs.

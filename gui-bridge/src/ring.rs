@@ -1,4 +1,5 @@
-//! A large stream of the bridge's own node: looked at so often, and its newest record read where it lies.
+//! A stream that is looked at so often, and its newest record read where it lies: a large one of the bridge's own node,
+//! or a replica that this node has of another one's.
 //!
 //! A record is held only while it is drawn, which copies what is kept of it: a viewer or a disk that stands still holds
 //! none. What writes the stream does not notice that it is looked at.
@@ -17,6 +18,8 @@ pub(crate) struct Ring {
     period: Duration,
     /// When it is looked at next.
     due: Instant,
+    /// When it was looked at last.
+    looked: Instant,
     stream: Option<Stream<()>>,
     /// The record that was drawn last.
     drawn: Option<RecordInfo>,
@@ -27,7 +30,8 @@ pub(crate) struct Ring {
 impl Ring {
     /// A stream of the interface with this hash, looked at once in `period`.
     pub(crate) fn new(interface: u32, period: Duration) -> Self {
-        Self { interface, period, due: Instant::now(), stream: None, drawn: None, told: None }
+        let now = Instant::now();
+        Self { interface, period, due: now, looked: now, stream: None, drawn: None, told: None }
     }
 
     /// What was drawn is to be drawn once more.
@@ -49,6 +53,7 @@ impl Ring {
                 }
             }
         }
+        self.looked = now;
         if self.stream.is_some() {
             // In step with the period; but what was not looked at in time is not made up for.
             self.due = (self.due + self.period).max(now);
@@ -66,7 +71,11 @@ impl Ring {
                 draw(record.stamp_ns(), record.bytes());
                 None
             }
-            Ok(_) => None,
+            Ok(_) => {
+                // It is looked at again soon: one that is written as often as it is drawn is drawn each time.
+                self.due = self.looked;
+                None
+            }
             Err(error) => Some(error.to_string()),
         };
         if let Some(text) = failure {

@@ -3,7 +3,8 @@
 use crate::blueprint::Layout;
 use crate::ring::Ring;
 use crate::view::{Datum, View, Wish};
-use crate::{Scene, views};
+use crate::{Scene, replicas, views};
+use rerun::EntityPath;
 use rohrpost::common::DataHead;
 use rohrpost::description::{DescriptionRequest, noted};
 use rohrpost::interface::Interface;
@@ -55,6 +56,9 @@ enum Source {
     /// also from a stream: it comes so from each node, costs none of the stream's seats, and a bridge that is asleep is
     /// woken for it.
     Ring(Box<Ring>),
+    /// From a replica of this node, whatever its size: packages would be on the network besides. And where its delay
+    /// is drawn.
+    Replica(Box<Ring>, EntityPath),
 }
 
 /// What the bridge has for what comes.
@@ -117,6 +121,7 @@ impl Subjects {
             ("clock", true),
             ("slots", installation.tdma.is_some()),
             ("flows", !installation.flows.is_empty()),
+            ("replicas", !installation.replicas.is_empty()),
         ];
         let told = told.iter().filter(|(_, is_there)| *is_there).map(|(data, _)| *data);
         for (router, data) in routers.flat_map(|router| told.clone().map(move |data| (router, data))) {
@@ -162,13 +167,16 @@ impl Subjects {
                 let wish = self.views[view].wish();
                 let wish = wish.at(entry.rate.unwrap_or(wish.rate));
                 let interface = description.hash();
-                let source = match way(context.installation(), is_own, entry.from, &item, wish, self.intake) {
+                let source = match way(context.installation(), own, entry.from, &item, wish, self.intake) {
                     Way::Data => {
                         let mailbox = if wish.each { local::DATA } else { NEWEST };
                         let (from, number) = (entry.from, item.number);
                         Source::Data(context.subscribe_untyped(mailbox, from, number, interface, wish.rate)?)
                     }
                     Way::Ring => Source::Ring(Box::new(Ring::new(interface, self.intake.period_of(wish.rate)))),
+                    Way::Replica { delay } => {
+                        Source::Replica(Box::new(Ring::new(interface, self.intake.period_of(wish.rate))), delay)
+                    }
                     Way::Unseen { why } => {
                         tracing::warn!("{why}");
                         continue;
@@ -189,7 +197,12 @@ impl Subjects {
         let subjects = |view: usize| self.subjects.iter().filter(move |subject| subject.view == view);
         let used = (0..self.views.len()).filter(|view| subjects(*view).next().is_some());
         let own = (0..self.views.len()).flat_map(subjects);
-        let own = own.filter_map(|of| self.views[of.view].tab_of(&of.module, &of.item));
+        let own = own.filter_map(|of| {
+            let tab = self.views[of.view].tab_of(&of.module, &of.item)?;
+            let Source::Replica(_, delay) = &of.source else { return Some(tab) };
+            let (module, item) = (&of.module, &of.item.field.name);
+            Some(tab.over_curves(format!("{module} {item}, by a replica"), "Delay, ms".into(), delay.clone()))
+        });
         Layout::new(used.flat_map(|view| self.views[view].tabs()).chain(own).collect())
     }
 
@@ -210,14 +223,14 @@ impl Subjects {
 
     /// Whether there are streams to look at.
     pub(crate) fn have_rings(&self) -> bool {
-        self.subjects.iter().any(|subject| matches!(subject.source, Source::Ring(_)))
+        self.subjects.iter().any(|subject| !matches!(subject.source, Source::Data(_)))
     }
 
     /// Draws what is new in streams that are due.
     pub(crate) fn look(&mut self, scene: &mut Scene, context: &mut Context) {
         let (now, views) = (Instant::now(), &mut self.views);
         for Subject { from, module, item, source, view, .. } in &mut self.subjects {
-            let Source::Ring(ring) = source else { continue };
+            let Some(ring) = source.ring() else { continue };
             if !ring.is_due(context, *from, item, now) {
                 continue;
             }
@@ -232,7 +245,7 @@ impl Subjects {
     /// Nothing is known of what was sent before: all have to send everything once more, and streams are read again.
     pub(crate) fn want_repair(&mut self) {
         for subject in &mut self.subjects {
-            if let Source::Ring(ring) = &mut subject.source {
+            if let Some(ring) = subject.source.ring() {
                 ring.forget();
             }
         }
@@ -265,6 +278,15 @@ fn draw(view: &mut dyn View, scene: &mut Scene, stamp_ns: u64, datum: &Datum<'_>
     }
 }
 
+impl Source {
+    fn ring(&mut self) -> Option<&mut Ring> {
+        match self {
+            Self::Data(_) => None,
+            Self::Ring(ring) | Self::Replica(ring, _) => Some(ring),
+        }
+    }
+}
+
 impl Intake {
     /// Least time between two looks at a stream that is wanted so often.
     fn period_of(self, rate: Rate) -> Duration {
@@ -280,30 +302,43 @@ impl Intake {
 enum Way {
     Data,
     Ring,
+    Replica {
+        /// Where its delay is drawn.
+        delay: EntityPath,
+    },
     Unseen {
         /// What to do about it.
         why: String,
     },
 }
 
-/// How this datum comes. What a view wants each of comes as packages: they are counted and asked for once more.
-fn way(installation: &Installation, is_own: bool, from: Name, item: &DataItem, wish: Wish, intake: Intake) -> Way {
-    let spec = installation.module(from).and_then(|module| module.streams.get(&item.field.name));
+/// How this datum comes to a bridge on the node `own`. What a view wants each of comes as packages: they are counted
+/// and asked for once more.
+fn way(installation: &Installation, own: &str, from: Name, item: &DataItem, wish: Wish, intake: Intake) -> Way {
+    let (stream, node) = (&item.field.name, node_of(installation, from));
+    if item.kind == DataKind::Data || wish.each {
+        return Way::Data;
+    }
+    if let Some(replica) = installation.replica_on(own, from, stream) {
+        let delay = replicas::delay_of(&replica.text(installation), [node.unwrap_or("?"), own]);
+        return Way::Replica { delay };
+    }
+    let spec = installation.module(from).and_then(|module| module.streams.get(stream));
     let record_bytes = spec.copied().unwrap_or_default().record_bytes as usize;
-    let fits = |bytes_max: usize| DataHead::BYTES + record_bytes <= bytes_max;
-    if item.kind == DataKind::Data || wish.each || fits(if is_own { intake.body_bytes_max } else { BODY_BYTES_MAX }) {
+    let is_own = node == Some(own);
+    if DataHead::BYTES + record_bytes <= if is_own { intake.body_bytes_max } else { BODY_BYTES_MAX } {
         return Way::Data;
     }
     if is_own {
         return Way::Ring;
     }
-    let (stream, module) = (&item.field.name, installation.classes.format(from));
-    let node = node_of(installation, from).unwrap_or("?");
-    let most = BODY_BYTES_MAX - DataHead::BYTES;
+    let (module, node, most) =
+        (installation.classes.format(from), node.unwrap_or("?"), BODY_BYTES_MAX - DataHead::BYTES);
+    let remedy = installation.replica_remedy(own, from, stream);
     let why = format!(
         "stream `{stream}` of {module} is not shown: it is on node `{node}`, and its records of up to {record_bytes} \
-         bytes fit no package; draw it with a bridge on that node, or lower `record` in [module.stream.{stream}] of \
-         {module} to {most} if its values have no more"
+         bytes fit no package; {remedy}, or lower `record` in [module.stream.{stream}] of {module} to {most} if its \
+         values have no more"
     );
     Way::Unseen { why }
 }

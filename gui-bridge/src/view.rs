@@ -58,7 +58,7 @@ pub struct Wish {
 impl Wish {
     /// The newest, [`RATE_HZ`] times a second: for all that tells how things are now, such as a pose, a scan, a number.
     /// A bridge that stood still for a while goes on with what is true then. A stream of its own node with records that
-    /// may be larger than its data mailbox takes is read where it lies, at most 40 times a second.
+    /// may be larger than its data mailbox takes, or a replica there, is read where it lies, at most 40 times a second.
     pub fn newest() -> Self {
         Self { rate: Rate::Every(Duration::from_secs_f64(1.0 / RATE_HZ)), each: false }
     }

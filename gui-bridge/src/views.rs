@@ -6,6 +6,7 @@ use crate::error::DrawError;
 use crate::network::{Clocks, Network};
 use crate::pictures::Pictures;
 use crate::points::Clouds;
+use crate::replicas::Replicas;
 use crate::scene::Scene;
 use crate::slots::{Flows, Slots};
 use crate::states::Level;
@@ -27,6 +28,8 @@ pub(crate) fn built_in() -> Vec<Box<dyn View>> {
         Box::new(Pictures),
         Box::new(Clouds),
         Box::new(Output),
+        // Before the network: of both tabs the first is there.
+        Box::new(Replicas::default()),
         Box::new(Network::default()),
         Box::new(Clocks),
         Box::new(TcpLinks::default()),

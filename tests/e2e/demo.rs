@@ -40,6 +40,32 @@ fn the_simulated_robot_maps_and_says_what_came_of_it() {
     place.assert_empty();
 }
 
+/// Over three nodes scans, odometry and pictures are read by replicas alone.
+#[test]
+fn over_three_nodes_streams_come_by_replicas_and_no_record_is_lost_without_a_cause() {
+    let place = Place::new();
+    let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "-v"]);
+    if lacks_namespaces(&said.err) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let said = said.out;
+    assert!(said.contains("The demo went well.\n") && said.contains("lost without a cause: 0\n"), "{said}");
+    let (sent, came) = (number(&said, "; came whole: "), number(&said, "; incomplete: "));
+    assert!(sent > 100 && came > 100 && came <= sent, "{said}");
+    let ways: Vec<&str> = said.lines().filter(|line| line.contains("  base → ") && line.contains("0/")).collect();
+    assert_eq!(ways.len(), 5, "all of config/demo-nodes.toml: {said}");
+    for way in ways {
+        let columns: Vec<_> = way.split("  ").map(str::trim).filter(|column| !column.is_empty()).collect();
+        let [stream, _, sent, came, _, not_sent, _] = columns[..] else { panic!("{way}") };
+        assert!(sent.parse::<u64>().unwrap() > 5 && came.parse::<u64>().unwrap() > 5, "{way}");
+        assert_eq!(not_sent.contains(" sampled"), stream == "camera.0/image", "two of ten a second go: {way}");
+    }
+    assert!(number(&said, " scans mapped (") > 5, "{said}");
+    assert!(!said.lines().any(|line| line.starts_with("mapper ")), "it reads streams, on another node, too: {said}");
+    place.assert_empty();
+}
+
 /// The same robot over three nodes, on a network that loses, delays and reorders.
 #[test]
 fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_for() {

@@ -25,7 +25,7 @@ const SECURITY: &str = "security = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertific
     address = \"10.77.0.1\"\n\
                         server = \"base\"\n[access]\nmotor = [\"pilot\"]\n\
                         odometry = [\"pilot\", \"mapper\", \"tool\"]\n\
-                        laser = [\"pilot\", \"mapper\", \"tool\"]\n";
+                        laser = [\"pilot\", \"mapper\", \"tool\"]\ncamera = [\"tool\"]\n";
 /// Allowed growth of a process: its bounded queues and tables.
 const GROWTH_KIB_MAX: u64 = 16 << 10;
 

@@ -38,6 +38,7 @@ mod mailbox;
 mod mailboxes;
 mod measure;
 mod measure_gone;
+mod moved;
 mod new;
 mod nodes;
 mod once;

@@ -12,6 +12,9 @@ const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/tests/data/sm
 /// What the demo draws into.
 const FILE: &str = "rohrpost-demo.rrd";
 
+/// The last part of entities of the replica that brings pictures to the desk.
+const PICTURE: &str = r"camera.0\/image\ base\ \u{2192}\ desk";
+
 /// A demo that ran to its end: its output, and the number of rows of each entity in its drawing.
 struct Drawing {
     said: String,
@@ -121,6 +124,25 @@ fn the_simulated_robot_is_drawn() {
     drawing.has_robot(&modules, &["pilot", "gui"]); // the mapper reads streams
     drawing.has("/output", 1..=100);
     assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
+}
+
+/// The desk shows streams of the base by their replicas, and how late they are.
+#[test]
+fn streams_of_another_node_are_drawn_with_their_delay() {
+    let drawing = Drawing::where_possible(&["--nodes", "3", "--seconds", "16"]);
+    let Some(drawing) = drawing else { return };
+    assert!(drawing.said.contains("lost without a cause: 0\n"), "{}", drawing.said);
+    drawing.has("/world/scan/laser.0", 15..=180);
+    drawing.has("/world/robot/odometry.0", 15..=180);
+    drawing.has("/pictures/camera.0/image", 3..=40);
+    let (components, bytes) = content(&drawing.printed, "/pictures/camera.0/image");
+    assert!(components.contains("Image:buffer") && bytes >= f64::from(640 * 480 * 3), "{components:?}, {bytes} bytes");
+    let told = 2..=2 * drawing.took.as_secs() + 3;
+    for way in [PICTURE, r"laser.0\/scan\ base\ \u{2192}\ desk"] {
+        drawing.has(&format!("/network/records/{way}"), told.clone());
+        drawing.has(&format!("/network/delay/{way}"), told.clone());
+    }
+    drawing.has(&format!(r"/network/records\ lost/sampled\,\ {PICTURE}"), 1..=*told.end());
 }
 
 /// Each node draws its router's report of slots, and of flows that leave it.

@@ -93,6 +93,11 @@ impl Balance {
         }
     }
 
+    /// Datagrams that were lost on the wire.
+    pub(super) fn datagrams(&self) -> u64 {
+        self.datagrams
+    }
+
     pub(super) fn holds(&self) -> bool {
         self.wrong.is_empty()
     }

@@ -2,12 +2,11 @@
 //! line at its place, and messages name the original file.
 
 use super::arguments::{Arguments, GuiConnection};
-use super::drawing::GUI;
 use super::recording::{recorder, start_early};
 use crate::check;
 use crate::keys::certificates::{self, Renewal};
 use crate::terminal::Failure;
-use rohrpost_config::{Installation, Keys, Program};
+use rohrpost_config::{GUI, Installation, Keys, Program};
 use rohrpost_routers::security::random;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};

@@ -1,12 +1,9 @@
 //! The drawing that the GUI of a demo writes.
 
 use crate::terminal::say;
-use rohrpost_config::Installation;
+use rohrpost_config::{GUI, Installation};
 use std::path::PathBuf;
 use std::time::SystemTime;
-
-/// The class of the module that draws.
-pub(super) const GUI: &str = "gui";
 
 /// The file that the GUI will write, if it writes one.
 pub(crate) fn drawing(installation: &Installation) -> Option<PathBuf> {

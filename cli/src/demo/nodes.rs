@@ -5,6 +5,7 @@ use super::arguments::{Arguments, GuiConnection};
 use super::asked::{FIRST_FUNCTION, map_line, running};
 use super::drawing::{drawing, drawn};
 use super::losses::ExchangeLosses;
+use super::replicas::RecordBalance;
 use super::takeover::{TakeoverRecord, Victim, Watch};
 use super::{beyond, copy};
 use crate::launch::{LaunchedNodes, lab};
@@ -15,7 +16,9 @@ use crate::vocabulary::Vocabulary;
 use crate::{carried, flows, slots};
 use rohrpost::common::{GET_DATA, State};
 use rohrpost::interface::{DataPort, Interface};
-use rohrpost::interfaces::{CartographerInterface, FlowStates, Links, MapCounts, RouterInterface, SlotState};
+use rohrpost::interfaces::{
+    CartographerInterface, FlowStates, Links, MapCounts, ReplicaStates, RouterInterface, SlotState,
+};
 use rohrpost::survey::Survey;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, ToolLink};
@@ -105,7 +108,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     let survey = |(node, config): (&Arc<Node>, &rohrpost_config::Node)| Survey::new(node, installation, &config.name);
     let surveys = nodes.iter().zip(&installation.nodes).map(survey).collect::<Result<Vec<_>, _>>()?;
     let died = seen.died();
-    let links = settled(installation, &mut tool, &died)?;
+    let (links, records) = settled(installation, &mut tool, &died)?;
     let losses = ExchangeLosses::ask(installation, &mut tool);
     let kept = in_slots(installation, &mut tool)?;
     let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
@@ -117,9 +120,14 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     let losses = losses.table(installation, &mut vocabulary, |module| tool.describe(module).ok());
     tool.close();
     let balance = Balance::of(&links, installation.classes.tool().0, &died);
-    let well = errors.is_empty() && clocks_hold && balance.holds() && seen.is_well() && beyond::is_well(&beyond);
+    let well = errors.is_empty()
+        && clocks_hold
+        && balance.holds()
+        && records.holds()
+        && seen.is_well()
+        && beyond::is_well(&beyond);
     let verdict = if well { "The demo went well." } else { "The demo did not go well." };
-    let mut text = format!("{verdict}\n\n{balance}\n{clocks}");
+    let mut text = format!("{verdict}\n\n{balance}{records}\n{clocks}");
     let deaths = seen.text();
     if !deaths.is_empty() {
         text += &format!("\n{deaths}\n");
@@ -130,6 +138,11 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     }
     text += "\nOver the network; age: from the stamp of data to the mailbox on the other node:\n\n";
     text += &carried::by_class(installation, &links, |_| true);
+    let replicas = records.table();
+    if !replicas.is_empty() {
+        text += "\nStreams by replicas; delay: from writing to the arrival of the whole record:\n\n";
+        text += &replicas;
+    }
     text += &beyond::text(installation, &beyond, seen.tcp_router_died());
     if !verbose {
         return Ok((text, well));
@@ -223,17 +236,25 @@ fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
 }
 
 /// The routers' counters when nothing is under way: the sending modules are switched off first.
-fn settled(installation: &Installation, tool: &mut ToolLink, died: &[&str]) -> Result<Vec<Links>, Failure> {
+fn settled(
+    installation: &Installation,
+    tool: &mut ToolLink,
+    died: &[&str],
+) -> Result<(Vec<Links>, RecordBalance), Failure> {
     for module in installation.modules.iter().filter(|module| module.is_in_file()) {
         // A module that does not answer is reported above.
         let _ = tool.switch(module.name, false);
     }
-    let deadline = Instant::now() + SETTLE;
+    let (deadline, mut before) = (Instant::now() + SETTLE, None);
     loop {
         let links: Vec<Links> = of_routers(installation, tool, RouterInterface::LINKS)?;
-        if Balance::of(&links, installation.classes.tool().0, died).holds() || Instant::now() >= deadline {
-            return Ok(links);
+        let balance = Balance::of(&links, installation.classes.tool().0, died);
+        let records = RecordBalance::of(&replicas(installation, tool)?, balance.datagrams(), died);
+        let is_settled = balance.holds() && records.holds() && records.is_settled(before.as_ref());
+        if is_settled || Instant::now() >= deadline {
+            return Ok((links, records));
         }
+        before = Some(records);
         std::thread::sleep(LOOK);
     }
 }
@@ -246,20 +267,36 @@ fn in_slots(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Slot
     of_routers(installation, tool, RouterInterface::SLOTS)
 }
 
+/// What the routers on both ends of replicas report; others report nothing of them.
+fn replicas(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<ReplicaStates>, Failure> {
+    let is_end = |node: &&rohrpost_config::Node| {
+        let mut all = installation.replicas.iter();
+        all.any(|of| of.to.contains(&node.name) || installation.node_of(of.from) == Some(&node.name))
+    };
+    let ends = installation.lan_nodes().iter().filter(is_end);
+    ends.map(|node| of_router(installation, tool, &node.name, RouterInterface::REPLICAS)).collect()
+}
+
 /// The reports of all nodes' routers.
 fn of_routers<T: DeserializeOwned>(
     installation: &Installation,
     tool: &mut ToolLink,
     data: DataPort<T>,
 ) -> Result<Vec<T>, Failure> {
-    let mut all = Vec::new();
-    for node in installation.lan_nodes() {
-        let router = installation.router_of(&node.name).ok_or("no router")?;
-        let write = |body: &mut Vec<u8>| append(body, &(data.number,));
-        let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
-        let answer = tool.call(router, GET_DATA, RouterInterface::hash(), write, read);
-        let told = |error: CallError| format!("router of {}: {error}", node.name);
-        all.push(answer.map(|(_, told)| told).map_err(told)?);
-    }
-    Ok(all)
+    let nodes = installation.lan_nodes().iter();
+    nodes.map(|node| of_router(installation, tool, &node.name, data)).collect()
+}
+
+fn of_router<T: DeserializeOwned>(
+    installation: &Installation,
+    tool: &mut ToolLink,
+    node: &str,
+    data: DataPort<T>,
+) -> Result<T, Failure> {
+    let router = installation.router_of(node).ok_or("no router")?;
+    let write = |body: &mut Vec<u8>| append(body, &(data.number,));
+    let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
+    let answer = tool.call(router, GET_DATA, RouterInterface::hash(), write, read);
+    let told = |error: CallError| format!("router of {node}: {error}");
+    Ok(answer.map(|(_, told)| told).map_err(told)?)
 }

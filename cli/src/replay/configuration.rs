@@ -13,7 +13,7 @@ use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::output::plain::line;
 use rohrpost::schema::Description;
-use rohrpost_config::{Installation, Module, Program, RECORDER, REPLAY, StreamSpec};
+use rohrpost_config::{GUI, Installation, Module, Program, RECORDER, REPLAY, StreamSpec};
 use rohrpost_modules::journal::JOURNAL_NAME;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -21,8 +21,6 @@ use toml::{Table, Value};
 
 /// The replay's one node.
 pub(super) const NODE: &str = "replay";
-/// The class of the module that draws.
-const GUI: &str = "gui";
 /// The program that shows what a node does.
 const BRIDGE: &str = "rohrpost-gui-bridge";
 /// Built-in modules that tell the node's time themselves.

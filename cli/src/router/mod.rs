@@ -11,6 +11,7 @@ mod slots;
 use crate::terminal::Failure;
 use rohrpost::interfaces::{Router, RouterInterface};
 use rohrpost::{Context, Module, ModuleError, Start};
+use rohrpost_mailbox::Latency;
 use rohrpost_modules::runtime::{exit, kept, run_started};
 use rohrpost_routers::impair;
 use rohrpost_routers::replication::ReplicaSettings;
@@ -49,6 +50,8 @@ struct RouterModule {
     shell: Shell,
     /// All of the installation.
     replicas: Vec<ReplicaSettings>,
+    /// Delays of those that come, as they were reported last.
+    delays: Vec<Latency>,
 }
 
 impl Router for RouterModule {}
@@ -91,7 +94,7 @@ impl Module for RouterModule {
         }
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { shell, replicas })
+        Ok(Self { shell, replicas, delays: Vec::new() })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -108,7 +111,8 @@ impl Module for RouterModule {
         context.publish_now(RouterInterface::FLOWS, &flows)?;
         let installation = context.installation();
         let node = installation.node_of(context.me()).unwrap_or_default();
-        if let Some(states) = replicas::of(node, self.shell.replicas(), installation, &self.replicas) {
+        let Self { shell, replicas, delays } = self;
+        if let Some(states) = replicas::of(node, shell.replicas(), installation, replicas, delays) {
             context.publish_now(RouterInterface::REPLICAS, &states)?;
         }
         Ok(())

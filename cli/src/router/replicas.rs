@@ -3,6 +3,7 @@
 use rohrpost::interfaces::{ReplicaCause, ReplicaState, ReplicaStates};
 use rohrpost::schema::Description;
 use rohrpost_config::Installation;
+use rohrpost_mailbox::Latency;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::replication::{Describe, ReplicaCounts, ReplicaLoss, ReplicaLosses, ReplicaSettings};
 use std::time::Duration;
@@ -18,11 +19,13 @@ impl Describe for Descriptions {
 }
 
 /// The present state on a node; none if it sends and has no replica. `all` is what `received` has the places of.
+/// `delays`: those of the last report.
 pub(crate) fn of(
     node: &str,
     counts: &ReplicaCounts,
     installation: &Installation,
     all: &[ReplicaSettings],
+    delays: &mut Vec<Latency>,
 ) -> Option<ReplicaStates> {
     let name = |index: NodeIndex| installation.nodes.get(usize::from(index)).map(|node| node.name.clone());
     let stream = |place: u16| installation.replicas.get(usize::from(place)).map(|replica| replica.text(installation));
@@ -35,15 +38,18 @@ pub(crate) fn of(
         asked: None,
         completed: None,
         again: Some(sent.again.get()),
+        delay_recent_ns: None,
         delay_p99_ns: None,
         delay_worst_ns: None,
         delayed: None,
         lost: causes(&sent.lost),
     });
     let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-    let received = counts.received.iter().map(|received| {
+    delays.resize_with(counts.received.len(), Latency::default);
+    let received = counts.received.iter().zip(delays).map(|(received, earlier)| {
         let delay = received.delay.get();
-        let p99 = delay.quantile(0.99);
+        let (recent, p99) = (delay.since(earlier).mean(), delay.quantile(0.99));
+        earlier.clone_from(&delay);
         ReplicaState {
             stream: stream(received.place).unwrap_or_default(),
             node: all.get(usize::from(received.place)).and_then(|replica| name(replica.node)).unwrap_or_default(),
@@ -53,6 +59,7 @@ pub(crate) fn of(
             asked: Some(received.asked.get()),
             completed: Some(received.completed.get()),
             again: None,
+            delay_recent_ns: recent.map(ns),
             delay_p99_ns: p99.map(ns),
             delay_worst_ns: p99.map(|_| ns(delay.max)),
             delayed: Some(received.delayed.get()),

@@ -1,6 +1,6 @@
 //! A node's client of the TCP router, as a module.
 
-use super::ends::{PERIOD, called, certificates, classes, configured, levels, line_parts, replicas};
+use super::ends::{PERIOD, ReplicaReport, called, certificates, classes, configured, levels, line_parts};
 use crate::router::{NoSettings, faults::Encoded, impairment};
 use rohrpost::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
 use rohrpost::{Context, Module, ModuleError};
@@ -16,6 +16,7 @@ use std::sync::Arc;
 pub(super) struct ClientModule {
     shell: ClientShell,
     node: String,
+    replicas: ReplicaReport,
     server: SocketAddr,
 }
 
@@ -73,7 +74,8 @@ impl Module for ClientModule {
         })?;
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { shell, node: node_name, server })
+        let replicas = ReplicaReport::new(installation, &node_name);
+        Ok(Self { shell, node: node_name, replicas, server })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -107,7 +109,7 @@ impl Module for ClientModule {
                 received: classes(&link.inn),
             },
         )?;
-        if let Some(states) = replicas(context.installation(), &self.node, self.shell.replicas()) {
+        if let Some(states) = self.replicas.states(context.installation(), self.shell.replicas()) {
             context.publish_now(TcpInterface::REPLICAS, &states)?;
         }
         Ok(())

@@ -4,7 +4,7 @@ use crate::router::replicas::{Descriptions, of};
 use rohrpost::ModuleError;
 use rohrpost::interfaces::{CarriedLoss, ClassPassed, ReplicaStates};
 use rohrpost_config::{Installation, Tcp};
-use rohrpost_mailbox::Priority;
+use rohrpost_mailbox::{Latency, Priority};
 use rohrpost_routers::replication::LineSettings;
 use rohrpost_routers::tcp::{Class, LineCounts, LineParts};
 use std::path::PathBuf;
@@ -35,10 +35,25 @@ pub(super) fn line_parts(installation: &Installation, node: &str) -> Option<Line
     Some(LineParts { settings, describe: Arc::new(Descriptions) })
 }
 
-/// How they stand.
-pub(super) fn replicas(installation: &Installation, node: &str, counts: &LineCounts) -> Option<ReplicaStates> {
-    let settings = LineSettings::new(installation, node)?;
-    of(node, &counts.replicas, installation, &settings.received)
+/// What a module publishes of the replicas that go by the TCP router.
+pub(super) struct ReplicaReport {
+    node: String,
+    settings: Option<LineSettings>,
+    /// Those of the last report.
+    delays: Vec<Latency>,
+}
+
+impl ReplicaReport {
+    /// Of a node.
+    pub(super) fn new(installation: &Installation, node: &str) -> Self {
+        Self { node: node.into(), settings: LineSettings::new(installation, node), delays: Vec::new() }
+    }
+
+    /// How they stand; none: there are none.
+    pub(super) fn states(&mut self, installation: &Installation, counts: &LineCounts) -> Option<ReplicaStates> {
+        let settings = self.settings.as_ref()?;
+        of(&self.node, &counts.replicas, installation, &settings.received, &mut self.delays)
+    }
 }
 
 /// The level of each priority.

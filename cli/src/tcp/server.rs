@@ -1,6 +1,6 @@
 //! The TCP router, as a module.
 
-use super::ends::{PERIOD, called, certificates, classes, configured, levels, line_parts, replicas, short};
+use super::ends::{PERIOD, ReplicaReport, called, certificates, classes, configured, levels, line_parts, short};
 use crate::router::{NoSettings, faults::Encoded};
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, Tcp, TcpInterface};
 use rohrpost::{Context, Module, ModuleError, Name};
@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 pub(super) struct ServerModule {
     shell: ServerShell,
-    node: String,
+    replicas: ReplicaReport,
     address: SocketAddr,
     began_ns: u64,
 }
@@ -56,11 +56,11 @@ impl Module for ServerModule {
         let faults = Arc::new(Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
         let own = installation.node_of(context.me()).unwrap_or_default().to_owned();
-        let replicas = line_parts(installation, &own);
+        let (replicas, report) = (line_parts(installation, &own), ReplicaReport::new(installation, &own));
         let shell = ServerShell::start(ServerParts { address, settings, faults, seal, names, node: &node, replicas })?;
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { shell, node: own, address, began_ns: monotonic_ns() })
+        Ok(Self { shell, replicas: report, address, began_ns: monotonic_ns() })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -90,7 +90,7 @@ impl Module for ServerModule {
                 classes: classes(&seen.classes),
             },
         )?;
-        if let Some(states) = replicas(context.installation(), &self.node, self.shell.replicas()) {
+        if let Some(states) = self.replicas.states(context.installation(), self.shell.replicas()) {
             context.publish_now(TcpInterface::REPLICAS, &states)?;
         }
         Ok(())

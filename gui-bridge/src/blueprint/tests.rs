@@ -129,6 +129,16 @@ fn pictures_and_points_are_beside_the_world_and_charts_beside_them() {
 }
 
 #[test]
+fn a_picture_of_another_node_has_its_delay_below_it() {
+    let delay = EntityPath::from(vec!["delay".into(), "camera.0/image".into()]);
+    let sent = Sent::of(vec![picture("camera.0 image").over_curves("both".into(), "Delay, ms".into(), delay)]);
+    let cell = "    Vertical\n      Tabs\n        Vertical 3 1\n          camera.0 image\n          Delay, ms\n";
+    assert!(sent.outline().contains(cell), "{}", sent.outline());
+    let origins = sent.all::<ViewOrigin>(sent.view("Delay, ms"), &ViewBlueprint::descriptor_space_origin());
+    assert_eq!(origins.iter().map(|origin| origin.0.as_str()).collect::<Vec<_>>(), [r"/delay/camera.0\/image"]);
+}
+
+#[test]
 fn of_more_than_three_beside_the_world_the_first_share_a_cell() {
     for (names, column) in [
         (&["a"][..], "Tabs( a ) "),

@@ -29,6 +29,9 @@ program = "eye"
 record = "1 MiB"
 [module.stream.middle]
 record = "32 KiB"
+[[replica]]
+stream = "camera.0/copied"
+to = ["main"]
 "#;
 const CAMERA: Name = Name::new(1, 112, 0, 0);
 const INTAKE: Intake = Intake { body_bytes_max: 20 * 1024, period: Duration::from_millis(50) };
@@ -43,27 +46,32 @@ fn installation() -> Installation {
 #[test]
 fn a_stream_is_read_in_place_where_no_package_of_the_bridge_takes_it() {
     let installation = installation();
-    let way = |kind, name: &str, is_own, wish| {
+    let way = |kind, name: &str, own, wish| {
         let item = DataItem { number: 1, kind, field: Field::new(name, <Image>::schema()) };
-        way(&installation, is_own, CAMERA, &item, wish, INTAKE)
+        way(&installation, own, CAMERA, &item, wish, INTAKE)
     };
     let (stream, newest) = (DataKind::Stream, Wish::newest());
-    for (kind, name, is_own, wish, right, why) in [
-        (DataKind::Data, "large", true, newest, Way::Data, "no stream"),
-        (stream, "small", true, newest, Way::Data, "4 KiB, as streams have without a section"),
-        (stream, "middle", true, newest, Way::Ring, "more than the mailbox takes"),
-        (stream, "large", true, newest, Way::Ring, "more than a package takes"),
-        (stream, "large", true, Wish::each(), Way::Data, "each is asked for once more when it is lost"),
-        (stream, "middle", false, newest, Way::Data, "it comes from afar, if the mailbox takes it"),
+    let replica = || Way::Replica { delay: replicas::delay_of("camera.0/copied", ["far", "main"]) };
+    for (kind, name, own, wish, right, why) in [
+        (DataKind::Data, "large", "far", newest, Way::Data, "no stream"),
+        (stream, "small", "far", newest, Way::Data, "4 KiB, as streams have without a section"),
+        (stream, "middle", "far", newest, Way::Ring, "more than the mailbox takes"),
+        (stream, "large", "far", newest, Way::Ring, "more than a package takes"),
+        (stream, "large", "far", Wish::each(), Way::Data, "each is asked for once more when it is lost"),
+        (stream, "middle", "main", newest, Way::Data, "it comes from afar, if the mailbox takes it"),
+        (stream, "copied", "main", newest, replica(), "it is here already, though a package would take it"),
+        (stream, "copied", "main", Wish::each(), Way::Data, "each is asked for once more when it is lost"),
+        (DataKind::Data, "copied", "main", newest, Way::Data, "no stream"),
+        (stream, "copied", "far", newest, Way::Data, "here it is written"),
     ] {
-        assert_eq!(way(kind, name, is_own, wish), right, "{name}: {why}");
+        assert_eq!(way(kind, name, own, wish), right, "{name}: {why}");
     }
-    let Way::Unseen { why } = way(stream, "large", false, newest) else { panic!("no package takes it") };
+    let Way::Unseen { why } = way(stream, "large", "main", newest) else { panic!("no package takes it") };
     assert_eq!(
         why,
         "stream `large` of camera.0 is not shown: it is on node `far`, and its records of up to 1048576 bytes fit no \
-         package; draw it with a bridge on that node, or lower `record` in [module.stream.large] of camera.0 to 65499 \
-         if its values have no more"
+         package; add a [[replica]] with `stream = \"camera.0/large\"` and `to = [\"main\"]`, or lower `record` in \
+         [module.stream.large] of camera.0 to 65499 if its values have no more"
     );
 }
 

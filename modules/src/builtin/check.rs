@@ -2,8 +2,11 @@
 //! modules, so it is here that both meet.
 
 use super::{Builtin, description};
-use rohrpost_config::{Installation, Module, Problem, Program, RECORDER, REPLAY, RecordedItems, Show, nearest};
-use rohrpost_mailbox::Name;
+use crate::common::DataHead;
+use rohrpost_config::{
+    GUI, Installation, Module, Problem, Program, RECORDER, REPLAY, RecordedItems, Show, nearest, size_text,
+};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Name};
 use rohrpost_schema::{DataKind, Description};
 use std::collections::BTreeSet;
 
@@ -19,7 +22,10 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
             problems.extend(unknown_streams(installation, module, name));
         }
     }
-    problems.extend(installation.gui.show.iter().filter_map(|show| data_of(installation, show)));
+    for show in &installation.gui.show {
+        problems.extend(data_of(installation, show));
+        problems.extend(far_stream_of(installation, show));
+    }
     if let Some(record) = &installation.record {
         problems.extend(installation.modules.iter().filter_map(|module| settings_of_recorder(installation, module)));
         let streams = record.streams.iter().filter_map(|items| item_of(installation, items, true));
@@ -111,4 +117,65 @@ fn data_of(installation: &Installation, show: &Show) -> Option<Problem> {
     };
     let from = installation.classes.format(show.from);
     Some(Problem { line: Some(show.line), message: format!("[gui] show: `{from}` has no data `{data}`; {right}") })
+}
+
+/// A stream that the GUI is to show and does not get: it is on another node, fits no package, and has no replica here.
+fn far_stream_of(installation: &Installation, show: &Show) -> Option<Problem> {
+    let stream = show.data.as_ref()?;
+    let writer = installation.module(show.from)?;
+    let record_bytes = writer.streams.get(stream)?.record_bytes;
+    if DataHead::BYTES + record_bytes as usize <= BODY_BYTES_MAX {
+        return None;
+    }
+    let gui = installation.classes.id(GUI)?;
+    let has_none = |module: &&Module| {
+        module.node != writer.node && installation.replica_on(&module.node, show.from, stream).is_none()
+    };
+    let bridge = installation.modules.iter().filter(|module| module.name.class() == gui).find(has_none)?;
+    let (from, name) = (installation.classes.format(show.from), installation.classes.format(bridge.name));
+    let message = format!(
+        "[gui] show: `{name}` is on node {}, and stream `{stream}` of `{from}` is on node {}, with records of up to \
+         {}, which fit no package; {}",
+        bridge.node,
+        writer.node,
+        size_text(record_bytes.into()),
+        installation.replica_remedy(&bridge.node, show.from, stream)
+    );
+    Some(Problem { line: Some(show.line), message })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    const NODES: &str = include_str!("../../../config/demo-nodes.toml");
+
+    fn told(text: &str) -> Vec<String> {
+        let installation = Installation::parse(text, Path::new("robot.toml")).unwrap();
+        check(&installation).into_iter().map(|problem| problem.message).collect()
+    }
+
+    /// The file with its last replica, that of the picture, changed.
+    fn changed(change: impl Fn(&str) -> String) -> String {
+        let (before, picture) = NODES.rsplit_once("[[replica]]\n").unwrap();
+        format!("{before}{}", change(&format!("[[replica]]\n{picture}")))
+    }
+
+    #[test]
+    fn a_large_stream_is_shown_on_another_node_by_its_replica_alone() {
+        let head = "[gui] show: `gui.0` is on node desk, and stream `image` of `camera.0` is on node base, with \
+                    records of up to 1 MiB, which fit no package; ";
+        assert_eq!(told(NODES), [""; 0]);
+        assert_eq!(
+            told(&changed(|_| String::new())),
+            [format!("{head}add a [[replica]] with `stream = \"camera.0/image\"` and `to = [\"desk\"]`")]
+        );
+        let elsewhere = changed(|replica| replica.replace("desk", "brain"));
+        let line = elsewhere.lines().position(|line| line.contains("camera.0/image")).unwrap();
+        assert_eq!(told(&elsewhere), [format!("{head}add \"desk\" to `to` of the [[replica]] in line {line}")]);
+        let [there, here] = ["desk", "base"].map(|node| format!("name = \"gui.0\"\nnode = \"{node}\""));
+        let moved = changed(|_| String::new()).replacen(&there, &here, 1);
+        assert_eq!(told(&moved), [""; 0], "beside the camera it reads the stream itself");
+    }
 }

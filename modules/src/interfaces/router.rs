@@ -306,7 +306,7 @@ pub struct ReplicaStates {
 }
 
 /// What became of the records of a replica, on one of its two ends.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ReplicaState {
     /// The stream, as the file names it: `camera.0/image`.
     pub stream: String,
@@ -324,7 +324,10 @@ pub struct ReplicaState {
     pub completed: Option<u64>,
     /// Parts that were sent again, since the node asked for them; none where it comes.
     pub again: Option<u64>,
-    /// From writing to arrival, by system time, ns: 99 of 100 records were not slower; none where it is sent, or
+    /// From writing to arrival, by system time, ns: the mean of the records that came since the last report; none
+    /// where it is sent, without a common time, or if none came.
+    pub delay_recent_ns: Option<u64>,
+    /// The same of all: 99 of 100 records were not slower; none where it is sent, or
     /// without a common time.
     pub delay_p99_ns: Option<u64>,
     /// The slowest.

@@ -26,7 +26,7 @@ pub struct ReplicaSettings {
     pub delay_alarm_ns: u64,
     /// Lost parts are asked for until nothing came of a record for so long, ns; 0: never.
     pub deadline_ns: u64,
-    /// The level on which they are sent: that of the writer's class.
+    /// The level on which they are sent: that of the class of `from`.
     pub level: u8,
 }
 
@@ -51,7 +51,7 @@ impl ReplicaSettings {
     pub fn all(installation: &Installation) -> Vec<Self> {
         let Some(network) = installation.network else { return Vec::new() };
         let of = |replica: &Replica| {
-            let level = network.level(replica.priority(installation));
+            let level = network.level(replica.priority());
             Self::of(installation, replica, level, installation.hop_by_lan(replica).as_ref(), |_| true)
         };
         installation.replicas.iter().map(of).collect()
@@ -92,7 +92,7 @@ impl LineSettings {
         let server = tcp.server.as_deref()?;
         let both = |replica: &Replica| {
             let hops = installation.hops_by_tcp(replica);
-            let level = tcp.level(replica.priority(installation));
+            let level = tcp.level(replica.priority());
             let from_here = hops.iter().find(|(from, _)| *from == own);
             let to_here = hops.iter().find(|(_, to)| to.contains(&own));
             let of =
