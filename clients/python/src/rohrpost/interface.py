@@ -14,6 +14,7 @@ from .schema import tree
 from .schema.description import DataItem, Description, Function
 from .schema.encode import encode
 from .schema.errors import WalkError
+from .schema.text import show
 from .schema.tree import Field, Type
 from .wire import COMMAND_MAX, DATA_MAX, FIRST_OWN
 
@@ -115,7 +116,7 @@ class Parameter:
         except WalkError as error:
             raise Misuse(f"{owner}.{self.name}: {error}") from None
         if not self.is_in_range(value):
-            raise Misuse(f"{owner}.{self.name}: {value!r} is not in its range, {self.range_text}")
+            raise Misuse(f"{owner}.{self.name}: {show(self.field.type, value)} is not in its range, {self.range_text}")
 
     def is_in_range(self, value: Any) -> bool:
         """Whether a value of its type is in its range; what is not a number is in none."""
@@ -125,7 +126,7 @@ class Parameter:
     @property
     def range_text(self) -> str:
         """Its range in words."""
-        least, most = self._words.min, self._words.max
+        least, most = (None if it is None else show(self.field.type, it) for it in (self._words.min, self._words.max))
         if least is not None and most is not None:
             return f"{least}..={most}"
         return f"at least {least}" if most is None else f"at most {most}"
@@ -201,14 +202,15 @@ class Module:
             raise Misuse(f"{cls.__name__}: of which class is it? write `class {cls.__name__}(Module, klass=\"…\")`")
         cls.interface_ = _interface(cls, klass, interface or cls.__name__)
 
-    def switched_on(self) -> None:
-        """Its work begins. Yours to write."""
+    def switched_on(self) -> Any:
+        """Its work begins. Yours to write; with asyncio it may be a coroutine."""
 
-    def switched_off(self) -> None:
-        """It goes to its safe state. Yours to write."""
+    def switched_off(self) -> Any:
+        """It goes to its safe state. Yours to write; with asyncio it may be a coroutine."""
 
     def parameters_set(self) -> None:
-        """Parameters were set. Yours to write; what it raises takes them back, and its words are told."""
+        """Parameters were set. Yours to write, never as a coroutine; what it raises takes them back, and its words are
+        told."""
 
     def publish(self, data: str, value: Any, time_ns: int | None = None) -> None:
         """Publishes data by its name. ``time_ns``: when it was true, ns since 1970; none: now."""

@@ -21,6 +21,7 @@ from ..errors import CallError, Misuse, NoConnection, RohrpostError
 from ..interface import Module
 from ..names import Name
 from ..schema.description import Description
+from ..schema.tree import UNIT, Type
 from .. import wire
 from . import calling
 from .calls import Call
@@ -104,12 +105,13 @@ class Client:
 
     # Calls.
 
-    def _module(self, name: str | Name) -> Name:
-        return self._core.settings.installation.name(name)
+    def name(self, text: str | Name) -> Name:
+        """The module that a text names, such as ``motor.0``."""
+        return self._core.settings.installation.name(text)
 
     def describe(self, name: str | Name, timeout_s: float = 1.0) -> Description:
         """What a module offers."""
-        return self._describe(self._core.own, self._module(name), timeout_s)
+        return self._describe(self._core.own, self.name(name), timeout_s)
 
     def _describe(self, endpoint: Endpoint, to: Name, timeout_s: float) -> Description:
         self._check()
@@ -130,7 +132,15 @@ class Client:
         found: Description = box[0]
         return found
 
+    def command(self, name: str | Name, number: int, interface: int, arguments: bytes, timeout_s: float = 1.0) -> bytes:
+        """Calls a function by its number, with the hash of its interface; arguments and result are postcard."""
+        prepared = calling.Prepared(number, interface, arguments, UNIT)
+        return self._sent(self._core.own, self.name(name), prepared, timeout_s).outcome()
+
     def _call(self, endpoint: Endpoint, to: Name, prepared: calling.Prepared, timeout_s: float) -> Any:
+        return calling.result(prepared, self._sent(endpoint, to, prepared, timeout_s))
+
+    def _sent(self, endpoint: Endpoint, to: Name, prepared: calling.Prepared, timeout_s: float) -> Call:
         self._check()
         done = threading.Event()
         with self._lock:
@@ -149,11 +159,11 @@ class Client:
         if calling.is_stale(call):
             with self._lock:
                 self._core.forget(to)
-        return calling.result(prepared, call)
+        return call
 
     def call(self, name: str | Name, function: str, *values: Any, timeout_s: float = 1.0, **named: Any) -> Any:
         """Calls a function of a module by its description. Raises :class:`rohrpost.CallError`."""
-        return self._call_by_name(self._core.own, self._module(name), function, values, named, timeout_s)
+        return self._call_by_name(self._core.own, self.name(name), function, values, named, timeout_s)
 
     def _call_by_name(
         self, endpoint: Endpoint, to: Name, function: str, values: Any, named: dict[str, Any], timeout_s: float
@@ -164,21 +174,21 @@ class Client:
 
     def proxy(self, name: str | Name, timeout_s: float = 1.0) -> Proxy:
         """The functions of a module: ``client.proxy("motor.0").drive(0.3, 0.0)``. ``timeout_s``: of each call."""
-        return Proxy(self, self._core.own, self._module(name), timeout_s)
+        return Proxy(self, self._core.own, self.name(name), timeout_s)
 
     def status(self, name: str | Name, timeout_s: float = 1.0) -> Status:
         """How a module is."""
-        status: Status = self._call(self._core.own, self._module(name), calling.STATUS, timeout_s)
+        status: Status = self._call(self._core.own, self.name(name), calling.STATUS, timeout_s)
         return status
 
     def switch(self, name: str | Name, on: bool, timeout_s: float = 1.0) -> None:
         """Switches a module on or off."""
         prepared = calling.prepare_common(wire.ON if on else wire.OFF)
-        self._call(self._core.own, self._module(name), prepared, timeout_s)
+        self._call(self._core.own, self.name(name), prepared, timeout_s)
 
     def get(self, name: str | Name, data: str, timeout_s: float = 1.0) -> tuple[int, Any]:
         """The newest data of a module: when they were true, ns since 1970, and themselves."""
-        to = self._module(name)
+        to = self.name(name)
         prepared = calling.prepare_get(to, self._describe(self._core.own, to, timeout_s), data)
         time_ns, value = self._call(self._core.own, to, prepared, timeout_s)
         return time_ns, value
@@ -212,7 +222,7 @@ class Client:
         with self._lock:
             self._core.now_ns = time.monotonic_ns()
             subscription._following = self._core.follow(
-                self._core.own, self._module(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
+                self._core.own, self.name(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
                 subscription._take, subscription._said,
             )  # fmt: skip
         self._wake()
@@ -226,7 +236,7 @@ class Client:
         if module._host is not None:
             raise Misuse(f"{type(module).__name__} is hosted already; make another one")
         with self._lock:
-            host = _ModuleHost(self, self._module(name), module)
+            host = _ModuleHost(self, self.name(name), module)
             self._hosts.append(host)
             module._host = host
         host.thread.start()
@@ -379,6 +389,11 @@ class Subscription:
         """Values that should have come and did not."""
         return self._following.lost
 
+    @property
+    def type(self) -> Type | None:
+        """The type of the values, once the module has described itself."""
+        return self._following.type
+
     def _take(self, data: Data) -> None:
         self.dropped += len(self._values) == self._values.maxlen
         self._values.append(data)
@@ -467,4 +482,4 @@ class _ModuleHost:
         self._client._wake()
 
     def proxy(self, module: Module, name: str) -> Proxy:
-        return Proxy(self._client, self._endpoint, self._client._module(name), 1.0)
+        return Proxy(self._client, self._endpoint, self._client.name(name), 1.0)

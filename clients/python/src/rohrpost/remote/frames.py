@@ -239,7 +239,8 @@ _PARSE = {WELCOME: _welcome, REFUSAL: _refusal, REGISTERED: _registered, PACKAGE
 OBJECTIONS = {
     1: "another client hosts this range, or what it lies in",
     2: "another client hosts a part of this range, or it crosses another range of this client",
-    3: "the range is not of the client's system, or the file gives it to another node",
+    3: "the name is not of the client's system, or the file gives it to another node: with TLS, use that node's "
+    "certificate; without, say `node NODE of SYSTEM` as the label",
     4: "no room for more names",
 }
 """Why a client may not host what it says."""
