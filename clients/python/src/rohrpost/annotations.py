@@ -6,7 +6,8 @@
 | :data:`U8` to :data:`U128`, :data:`I8` to :data:`I128`, :data:`F32`, :data:`Char` | themselves |
 | ``T | None``, ``list[T]``, ``dict[K, V]``, ``tuple[A, B]`` | option, list, map, tuple |
 | ``Annotated[list[T], Length(3)]`` | array |
-| a class with :func:`data`: with fields, an ``enum.Enum``, or a :class:`Choice` | struct, enum |
+| a class with :func:`data`: with fields, or an ``enum.Enum`` | struct, enum |
+| a :class:`Choice` | enum of which variants carry something |
 
 ``Annotated[float, said(unit="m/s", min=0.0, text="Forward.")]`` says more of a field or an argument.
 """
@@ -81,13 +82,19 @@ class said:
 class Choice:
     """An enum of which variants carry something; its annotations are the variants::
 
-        @rp.data
         class DriveError(rp.Choice):
             NotFinite: None
             Hardware: str
 
         DriveError("Hardware", "no answer")
+
+    ``name``: what others know it by, if not the class's own name.
     """
+
+    def __init_subclass__(cls, name: str | None = None) -> None:
+        super().__init_subclass__()
+        variants = tuple(_variant(cls, *it) for it in _hints(cls).items())
+        setattr(cls, _ATTRIBUTE, tree.Enum(name or cls.__name__, variants, _text(cls), cls))
 
     def __init__(self, name: str, value: Any = None) -> None:
         variants = getattr(self, _ATTRIBUTE).variants
@@ -119,16 +126,14 @@ def data(cls: type[T]) -> type[T]: ...
 def data(*, name: str) -> Callable[[type[T]], type[T]]: ...
 @dataclass_transform()
 def data(cls: type[T] | None = None, *, name: str | None = None) -> Any:
-    """A class that travels between modules: with fields (it becomes a dataclass), an ``enum.Enum``, or a
-    :class:`Choice`. ``name``: what others know it by, if not the class's own name. Its docstring becomes its text."""
+    """A class that travels between modules: with fields (it becomes a dataclass), or an ``enum.Enum``. ``name``: what
+    others know it by, if not the class's own name. Its docstring becomes its text."""
 
     def decorate(cls: type[T]) -> type[T]:
         known = name or cls.__name__
         if issubclass(cls, enum.Enum):
             variants = tuple(Named(member) for member in cls.__members__)
             made: Type = tree.Enum(known, variants, _text(cls), lambda chosen, _: cls[chosen])
-        elif issubclass(cls, Choice):
-            made = tree.Enum(known, tuple(_variant(cls, *it) for it in _hints(cls).items()), _text(cls), cls)
         else:
             made_class: Any = cls if "__dataclass_fields__" in cls.__dict__ else dataclass(cls)
             hints = _hints(made_class)
