@@ -57,6 +57,15 @@ fn python_conforms() {
     run(&["python3", "-B", client.to_str().unwrap()]);
 }
 
+#[test]
+fn python_passes_its_own_tests() {
+    let package = folder().join("../../clients/python");
+    let mut command = Command::new("python3");
+    command.args(["-B", "-m", "unittest", "discover", "-t", ".", "-s", "tests"]).current_dir(&package);
+    let said = command.env("PYTHONPATH", package.join("src")).output().unwrap();
+    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+}
+
 /// Not a test: the client in Rust, which the suite starts. Run as a test it ends at once.
 #[test]
 fn client() {

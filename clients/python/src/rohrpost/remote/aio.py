@@ -29,6 +29,7 @@ from ..schema.description import Description
 from ..schema.tree import UNIT, Type
 from . import calling, prepare
 from .calls import Call
+from .clock import passed_ns
 from .core import Core, Endpoint, not_connected
 from .following import Data, Following
 from .session import Settings, Step
@@ -67,7 +68,7 @@ class AsyncClient:
         self._context = context
         self._pid = os.getpid()
         self._loop = asyncio.get_running_loop()
-        self._core = Core(settings, own, time.monotonic_ns, time.time_ns)
+        self._core = Core(settings, own, passed_ns, time.time_ns)
         self._changed = asyncio.Event()
         self._line: _Line | None = None
         self._connecting: asyncio.Task[None] | None = None
@@ -147,7 +148,7 @@ class AsyncClient:
     async def _describe(self, endpoint: Endpoint, to: Name, timeout_s: float) -> Description:
         self._check()
         future: asyncio.Future[Description | CallError] = self._loop.create_future()
-        self._core.now_ns = time.monotonic_ns()
+        self._core.now_ns = passed_ns()
         self._core.describe(endpoint, to, int(timeout_s * 1e9), lambda result: _settle(future, result))
         self._soon()
         found = await future
@@ -169,7 +170,7 @@ class AsyncClient:
         self._check()
         future: asyncio.Future[Call] = self._loop.create_future()
         call = endpoint.caller.begin(
-            time.monotonic_ns(), to, prepared.number, prepared.interface, prepared.arguments, int(timeout_s * 1e9),
+            passed_ns(), to, prepared.number, prepared.interface, prepared.arguments, int(timeout_s * 1e9),
             lambda call: _settle(future, call),
         )  # fmt: skip
         self._soon()
@@ -216,7 +217,7 @@ class AsyncClient:
     def time(self) -> SystemTime | None:
         """System time as the TCP router has it, with its error bound; none: it is not known."""
         self._check()
-        return self._core.time(time.monotonic_ns())
+        return self._core.time(passed_ns())
 
     def subscribe(
         self,
@@ -231,7 +232,7 @@ class AsyncClient:
         """Follows data of a module; see :meth:`rohrpost.remote.Client.subscribe`."""
         self._check()
         subscription = AsyncSubscription(self, 1 if newest else room)
-        self._core.now_ns = time.monotonic_ns()
+        self._core.now_ns = passed_ns()
         subscription._following = self._core.follow(
             self._core.own, self.name(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
             subscription._take, subscription._said,
@@ -263,7 +264,7 @@ class AsyncClient:
             return
         line = self._line
         for _ in range(64):
-            step, until_ns = self._core.poll(time.monotonic_ns())
+            step, until_ns = self._core.poll(passed_ns())
             if step is Step.CONNECT:
                 self._connecting = self._loop.create_task(self._connect())
             elif step is Step.CLOSE:
@@ -273,7 +274,7 @@ class AsyncClient:
             elif step is Step.WRITE and line is not None and line.write():
                 continue
             break
-        wait_ns = until_ns - time.monotonic_ns() if step is Step.WAIT else 100_000_000 if step is Step.WRITE else 0
+        wait_ns = until_ns - passed_ns() if step is Step.WAIT else 100_000_000 if step is Step.WRITE else 0
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self._loop.call_later(max(0, min(wait_ns, 250_000_000)) / 1e9, self._turn)
@@ -286,16 +287,16 @@ class AsyncClient:
         except (OSError, asyncio.TimeoutError) as error:
             host, port = self._server
             why = f"the TCP router at {host}:{port} is not reached: {error}"
-            self._core.session.closed(time.monotonic_ns(), why)
+            self._core.session.closed(passed_ns(), why)
         else:
             self._line = line
-            self._core.session.connected(time.monotonic_ns())
+            self._core.session.connected(passed_ns())
         self._soon()
 
     def _broken(self, line: _Line, why: str) -> None:
         if self._line is line and not self._is_closed:
             self._line = None
-            self._core.session.closed(time.monotonic_ns(), why)
+            self._core.session.closed(passed_ns(), why)
             self._soon()
 
 
@@ -329,7 +330,7 @@ class _Line(asyncio.Protocol):
         session = self._client._core.session
         ready = session.ready()
         self.transport.write(ready)
-        session.took(time.monotonic_ns(), len(ready))
+        session.took(passed_ns(), len(ready))
         self._flush()
         return True
 
@@ -347,7 +348,7 @@ class _Line(asyncio.Protocol):
             return self._client._broken(self, str(error))
         self._flush()
         if self._client._line is self:
-            self._client._core.received(time.monotonic_ns(), plain)
+            self._client._core.received(passed_ns(), plain)
             self._client._soon()
 
     def connection_lost(self, error: Exception | None) -> None:
@@ -438,7 +439,7 @@ class AsyncSubscription:
         """Ends it."""
         if not self._is_closed and not self._client._is_closed:
             self._is_closed = True
-            self._client._core.now_ns = time.monotonic_ns()
+            self._client._core.now_ns = passed_ns()
             self._client._core.unfollow(self._client._core.own, self._following)
             self._client._soon()
 
@@ -450,7 +451,7 @@ class _ModuleHost:
         self._client = client
         self._has_work = asyncio.Event()
         core = client._core
-        core.now_ns = time.monotonic_ns()
+        core.now_ns = passed_ns()
         self._endpoint = core.host(core.now_ns, name, module, self._has_work.set)
         core.follow_inputs(self._endpoint, lambda problem: None)
         self.task = client._loop.create_task(self._run())
@@ -471,7 +472,7 @@ class _ModuleHost:
                     result = await result
             except Exception as error:  # The author's code may raise anything; the module is in error then.
                 failed = error
-            work.finish(time.monotonic_ns(), result, failed)
+            work.finish(passed_ns(), result, failed)
             self._client._soon()
             # Others get their turn, however much there is to do.
             await asyncio.sleep(0)
@@ -480,7 +481,7 @@ class _ModuleHost:
         self._client._check()
         hosted = self._endpoint.hosted
         assert hosted is not None
-        hosted.publish(time.monotonic_ns(), data, value, time_ns)
+        hosted.publish(passed_ns(), data, value, time_ns)
         self._client._soon()
 
     def proxy(self, module: Module, name: str) -> AsyncProxy:

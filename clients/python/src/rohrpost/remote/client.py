@@ -25,6 +25,7 @@ from ..schema.tree import UNIT, Type
 from .. import wire
 from . import calling
 from .calls import Call
+from .clock import passed_ns
 from .core import Core, Endpoint, not_connected
 from .following import Data, Following
 from .session import Settings, Step
@@ -44,7 +45,7 @@ class Client:
         self._pid = os.getpid()
         self._mutex = threading.RLock()
         self._lock = threading.Condition(self._mutex)
-        self._core = Core(settings, own, time.monotonic_ns, time.time_ns)
+        self._core = Core(settings, own, passed_ns, time.time_ns)
         self._hosts: list[_ModuleHost] = []
         self._is_closed = False
         self._wake_out, self._wake_in = socket.socketpair()
@@ -114,7 +115,6 @@ class Client:
         return self._describe(self._core.own, self.name(name), timeout_s)
 
     def _describe(self, endpoint: Endpoint, to: Name, timeout_s: float) -> Description:
-        self._check()
         box: list[Any] = []
         done = threading.Event()
 
@@ -123,7 +123,8 @@ class Client:
             done.set()
 
         with self._lock:
-            self._core.now_ns = time.monotonic_ns()
+            self._check()
+            self._core.now_ns = passed_ns()
             self._core.describe(endpoint, to, int(timeout_s * 1e9), take)
         self._wake()
         done.wait()
@@ -141,10 +142,10 @@ class Client:
         return calling.result(prepared, self._sent(endpoint, to, prepared, timeout_s))
 
     def _sent(self, endpoint: Endpoint, to: Name, prepared: calling.Prepared, timeout_s: float) -> Call:
-        self._check()
         done = threading.Event()
         with self._lock:
-            now_ns = time.monotonic_ns()
+            self._check()
+            now_ns = passed_ns()
             call = endpoint.caller.begin(
                 now_ns, to, prepared.number, prepared.interface, prepared.arguments, int(timeout_s * 1e9),
                 lambda _: done.set(),
@@ -197,7 +198,7 @@ class Client:
         """System time as the TCP router has it, with its error bound; none: it is not known."""
         self._check()
         with self._lock:
-            return self._core.time(time.monotonic_ns())
+            return self._core.time(passed_ns())
 
     # Data.
 
@@ -217,10 +218,10 @@ class Client:
         counts. ``room``: values that wait here; the oldest gives way. ``expected``: the type that they must have, such
         as ``rohrpost.Odometry``.
         """
-        self._check()
         subscription = Subscription(self, 1 if newest else room)
         with self._lock:
-            self._core.now_ns = time.monotonic_ns()
+            self._check()
+            self._core.now_ns = passed_ns()
             subscription._following = self._core.follow(
                 self._core.own, self.name(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
                 subscription._take, subscription._said,
@@ -232,10 +233,10 @@ class Client:
 
     def host(self, name: str | Name, module: Module) -> None:
         """Hosts a module under this name until the client is closed. Its functions run in a thread of their own."""
-        self._check()
-        if module._host is not None:
-            raise Misuse(f"{type(module).__name__} is hosted already; make another one")
         with self._lock:
+            self._check()
+            if module._host is not None:
+                raise Misuse(f"{type(module).__name__} is hosted already; make another one")
             host = _ModuleHost(self, self.name(name), module)
             self._hosts.append(host)
             module._host = host
@@ -258,7 +259,7 @@ class Client:
         try:
             while not self._is_closed:
                 with self._lock:
-                    step, until_ns = self._core.poll(time.monotonic_ns())
+                    step, until_ns = self._core.poll(passed_ns())
                     self._lock.notify_all()
                 if step is Step.CONNECT:
                     line = self._connect(selector)
@@ -268,6 +269,11 @@ class Client:
                 else:
                     line = self._turn(selector, line, step, until_ns)
         finally:
+            with self._lock:
+                # However it ends, nobody waits for it any more.
+                self._is_closed = True
+                self._core.close("this client is closed")
+                self._lock.notify_all()
             self._drop(selector, line)
             selector.close()
             self._wake_in.close()
@@ -288,12 +294,12 @@ class Client:
             why = f"the TCP router at {host}:{port} is not reached: {error}"
         with self._lock:
             if why:
-                self._core.session.closed(time.monotonic_ns(), why)
+                self._core.session.closed(passed_ns(), why)
                 return None
             stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             stream.setblocking(False)
             selector.register(stream, selectors.EVENT_READ)
-            self._core.session.connected(time.monotonic_ns())
+            self._core.session.connected(passed_ns())
             return _Line(stream, Plain() if self._context is None else Sealed(self._context))
 
     def _turn(self, selector: selectors.BaseSelector, line: _Line | None, step: Step, until_ns: int) -> _Line | None:
@@ -303,7 +309,7 @@ class Client:
                 events = selectors.EVENT_READ | (selectors.EVENT_WRITE if line.transport.pending() else 0)
                 selector.modify(line.stream, events)
             ready = self._core.session.ready() if line is not None and line.transport.is_ready else b""
-            wait_ns = 0 if ready and line and not line.transport.pending() else until_ns - time.monotonic_ns()
+            wait_ns = 0 if ready and line and not line.transport.pending() else until_ns - passed_ns()
             if step is Step.WRITE and line is not None and line.transport.pending():
                 wait_ns = 100_000_000
             for key, _ in selector.select(max(0.0, min(wait_ns, 250_000_000) / 1e9)):
@@ -314,7 +320,7 @@ class Client:
         except (OSError, NoConnection) as error:
             why = str(error) if isinstance(error, NoConnection) else f"the connection broke: {error}"
             with self._lock:
-                self._core.session.closed(time.monotonic_ns(), why)
+                self._core.session.closed(passed_ns(), why)
             self._drop(selector, line)
             return None
         return line
@@ -325,7 +331,7 @@ class Client:
             with self._lock:
                 ready = self._core.session.ready()
                 line.transport.write(ready)
-                self._core.session.took(time.monotonic_ns(), len(ready))
+                self._core.session.took(passed_ns(), len(ready))
         if pending:
             try:
                 del pending[: line.stream.send(pending)]
@@ -341,7 +347,7 @@ class Client:
             raise NoConnection("the TCP router closed the connection")
         plain = line.transport.read(data)
         with self._lock:
-            self._core.received(time.monotonic_ns(), plain)
+            self._core.received(passed_ns(), plain)
             self._lock.notify_all()
 
 
@@ -429,7 +435,7 @@ class Subscription:
             return
         with self._client._lock:
             self._is_closed = True
-            self._client._core.now_ns = time.monotonic_ns()
+            self._client._core.now_ns = passed_ns()
             self._client._core.unfollow(self._client._core.own, self._following)
             self._client._lock.notify_all()
         self._client._wake()
@@ -442,7 +448,7 @@ class _ModuleHost:
         self._client = client
         self._turn = threading.Condition(client._mutex)
         core = client._core
-        core.now_ns = time.monotonic_ns()
+        core.now_ns = passed_ns()
         self._endpoint = core.host(core.now_ns, name, module, self._turn.notify_all)
         core.follow_inputs(self._endpoint, lambda problem: None)
         self.thread = threading.Thread(target=self._run, name=f"rohrpost {name}", daemon=True)
@@ -464,7 +470,7 @@ class _ModuleHost:
             except Exception as error:  # The author's code may raise anything; the module is in error then.
                 failed = error
             with self._client._lock:
-                work.finish(time.monotonic_ns(), result, failed)
+                work.finish(passed_ns(), result, failed)
             self._client._wake()
 
     def stop(self) -> None:
@@ -478,7 +484,7 @@ class _ModuleHost:
         hosted = self._endpoint.hosted
         assert hosted is not None
         with self._client._lock:
-            hosted.publish(time.monotonic_ns(), data, value, time_ns)
+            hosted.publish(passed_ns(), data, value, time_ns)
         self._client._wake()
 
     def proxy(self, module: Module, name: str) -> Proxy:

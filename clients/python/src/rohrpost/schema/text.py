@@ -192,7 +192,7 @@ def to_json(type: Type, value: Any) -> Any:
         return {_key(type.key, key): to_json(type.value, inner) for key, inner in value.items()}
     if isinstance(type, Struct):
         return _members_to_json(type.named, value)
-    variant = next(it for it in type.variants if it.name == value.name)
+    variant = type.by_name[value.name]
     payload = None if isinstance(value, enum.Enum) else _members_to_json(variant, value.value)
     return variant.name if payload is None else {variant.name: payload}
 
@@ -253,7 +253,7 @@ def show(type: Type, value: Any, limit: int = LIST_SHOWN) -> str:
         return f"{{{', '.join(entries)}}}"
     if isinstance(type, Struct):
         return _show_members(type.named, value, limit)
-    variant = next(it for it in type.variants if it.name == value.name)
+    variant = type.by_name[value.name]
     if variant.kind == 0:
         return _bare(variant.name)
     return _chosen(variant.name, _show_members(variant, value.value, limit))

@@ -139,6 +139,11 @@ class Enum:
         """Whether no variant carries anything."""
         return all(variant.kind == 0 for variant in self.variants)
 
+    @cached_property
+    def by_name(self) -> dict[str, Named]:
+        """Its variants; of those that share a name, the first."""
+        return {variant.name: variant for variant in reversed(self.variants)}
+
 
 Type = Union[Plain, Option, List, Array, Map, Tuple, Struct, Enum]
 
