@@ -87,7 +87,7 @@ class Peer(wire.Session):
                 order = ">" if head[15] & wire.BIG_ENDIAN else "<"
                 return Package(struct.unpack(order + "IIHhH", head[:14]) + (head[14], head[15], body))
 
-    def next(self, is_it, what):
+    def next(self, is_it):
         """The next package that is the one, answering `describe` on the way."""
         while True:
             its = self.package()
@@ -99,13 +99,15 @@ class Peer(wire.Session):
                 return its
 
     def command(self, number=None):
-        return self.next(lambda its: its.kind > 0 and number in (None, its.kind), f"command {number}")
+        return self.next(lambda its: its.kind > 0 and number in (None, its.kind))
 
     def reply(self, its, result, options=0, sequence=None, incarnation=None, sender=None):
         envelope = struct.pack("<II", incarnation or its.incarnation, sequence or its.sequence)
         self.send(its.sender, sender or its.to, -its.kind, its.id, envelope + result, its.priority, options)
 
-    def begin(self, to, number, interface, arguments=b"", incarnation=None, sequence=None, age_us=0, options=0, valid=5_000_000):
+    def begin(
+        self, to, number, interface, arguments=b"", incarnation=None, sequence=None, age_us=0, options=0, valid=5_000_000
+    ):
         if sequence is None:
             self.sequence += 1
             sequence = self.sequence
@@ -115,9 +117,7 @@ class Peer(wire.Session):
 
     def answer(self, number, sequence):
         """The fault's number or none, and the rest; and the package."""
-        its = self.next(
-            lambda its: its.kind == -number and struct.unpack("<I", its.body[4:8])[0] == sequence, f"a reply to {number}"
-        )
+        its = self.next(lambda its: its.kind == -number and struct.unpack("<I", its.body[4:8])[0] == sequence)
         rest = its.body[8:]
         return (wire.unvarint(rest) if its.options & wire.ERROR else (None, rest)), its
 
@@ -258,7 +258,7 @@ class Live:
         # Idempotent, so that it is not interrupted; what comes behind it is answered.
         sequence = self.peer.begin(self.to, AGAIN, self.hash, age_us=2_000_000, valid=1_000_000)
         other = self.peer.begin(self.to, wire.STATUS, COMMON)
-        its = self.peer.next(lambda its: its.kind in (-AGAIN, -wire.STATUS), "an answer")
+        its = self.peer.next(lambda its: its.kind in (-AGAIN, -wire.STATUS))
         require(struct.unpack("<I", its.body[4:8])[0] == other, f"call {sequence} is answered")
 
     def case_an_earlier_incarnation_learns_why_it_is_not_served(self):
@@ -278,7 +278,7 @@ class Live:
         require(self.peer.ask(self.to, wire.STATUS, COMMON)[1][0] == 2, "status: on")
 
     def data(self):
-        return self.peer.next(lambda its: its.kind == wire.data(BEAT) and its.sender == self.to, "data")
+        return self.peer.next(lambda its: its.kind == wire.data(BEAT) and its.sender == self.to)
 
     def wish(self, id, period_us=0, lease_ms=3000):
         return wire.varint(BEAT) + wire.varint(id) + wire.varint(period_us) + wire.varint(lease_ms) + b"\x02"

@@ -69,7 +69,9 @@ class Clients(unittest.TestCase):
             self.call("wrong")
         with self.assertRaises(rp.CallTimeout) as late:
             self.client.status("probe.9", timeout_s=0.2)
-        self.assertEqual(str(late.exception), "no answer from 7.96.9.0 within 200ms; does it run, and is it not too busy?")
+        self.assertEqual(
+            str(late.exception), "no answer from 7.96.9.0 within 200ms; does it run, and is it not too busy?"
+        )
         with self.assertRaises(rp.CallFault) as fault:
             self.client.command("probe.0", 16, self.client.describe("probe.0").hash, b"", 20)
         self.assertEqual(fault.exception.fault.number, ARGUMENTS)

@@ -105,7 +105,10 @@ class Sessions(unittest.TestCase):
                 "the system's digest here is 0000000000000001, that of base 0000000000000002; start all of a system "
                 "from the same file (`rohrpost check`, on both)",
             ),
-            (frame(REFUSAL, b"RpTc" + struct.pack("<BBHQQ", 1, 3, 0, 1, 2) + b"\x1b[2J"), "damaged: a text that is none"),
+            (
+                frame(REFUSAL, b"RpTc" + struct.pack("<BBHQQ", 1, 3, 0, 1, 2) + b"\x1b[2J"),
+                "damaged: a text that is none",
+            ),
         ]:
             line = Line()
             line.session.poll(line.now_ns)

@@ -70,8 +70,8 @@ class Length:
 
 @dataclass(frozen=True)
 class said:
-    """What an author says of a field or an argument besides its type. ``unit`` counts in the interface's hash, the range
-    and the text do not."""
+    """What an author says of a field or an argument besides its type. ``unit`` counts in the interface's hash, the
+    range and the text do not."""
 
     unit: str = ""
     min: Any = None
@@ -165,7 +165,9 @@ def _hints(cls: Any) -> dict[str, Any]:
     try:
         hints = typing.get_type_hints(cls, include_extras=True)
     except (NameError, TypeError, SyntaxError) as error:
-        raise Misuse(f"{cls.__name__}: an annotation cannot be read: {error}; define what it names before it") from error
+        raise Misuse(
+            f"{cls.__name__}: an annotation cannot be read: {error}; define what it names before it"
+        ) from error
     return hints
 
 

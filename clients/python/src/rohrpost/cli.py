@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from . import remote
+from .common import type_of_class
 from .errors import FunctionError, RohrpostError
 from .names import ALL_SYSTEMS, Installation, Name
 from .remote.calling import NoSuchFunction, function_of
@@ -80,14 +81,18 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--server", required=True, metavar="HOST:PORT", help="the TCP router; the port is 21119 unless said")
+    parser.add_argument(
+        "--server", required=True, metavar="HOST:PORT", help="the TCP router; the port is 21119 unless said"
+    )
     parser.add_argument("--as", dest="own", default="tool.127", metavar="NAME", help="own name (default: tool.127)")
     parser.add_argument("--digests", metavar="HEX-HEX", help="as `rohrpost check` prints them")
     parser.add_argument("--config", metavar="FILE", help="the robot's file, for its classes (needs Python 3.11)")
     parser.add_argument("--class", dest="classes", action="append", default=[], metavar="NAME=ID", help="one class")
     parser.add_argument("--system", type=int, metavar="ID", help="own system (default: that of FILE, else 1)")
     parser.add_argument("--tls", nargs=2, metavar=("FOLDER", "NAME"), help="certificates, and the own one")
-    parser.add_argument("--label", default="python -m rohrpost", help="own name for people, `node NODE of SYSTEM` if the file has it")
+    parser.add_argument(
+        "--label", default="python -m rohrpost", help="own name for people, `node NODE of SYSTEM` if the file has it"
+    )
     parser.add_argument("--timeout", type=float, default=1.0, metavar="SECONDS", help="for an answer (default: 1)")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -108,7 +113,9 @@ def _installation(options: argparse.Namespace) -> Installation:
     if options.digests:
         return Installation.with_digests(system, options.digests, classes)
     if not options.config:
-        raise Wrong("--digests is needed (`rohrpost check` prints them), or --config for a system that no file describes")
+        raise Wrong(
+            "--digests is needed (`rohrpost check` prints them), or --config for a system that no file describes"
+        )
     return Installation.with_classes(system, classes)
 
 
@@ -171,11 +178,14 @@ def _time(client: remote.Client, options: argparse.Namespace) -> int:
 def _status(client: remote.Client, options: argparse.Namespace) -> int:
     status = client.status(options.what, options.timeout)
     if options.json:
-        print(json.dumps(to_json(getattr(type(status), "__rohrpost_type__"), status)))
+        print(json.dumps(to_json(type_of_class(type(status)), status)))
     else:
         error = f": {plain(status.error)}" if status.error else ""
         print(f"{options.what} is {status.state.name.lower()}{error}")
-        print(f"up {status.uptime_ms / 1000:.1f} s, {status.subscribers} subscribers, {status.missed} missed, {status.lost} lost")
+        print(
+            f"up {status.uptime_ms / 1000:.1f} s, {status.subscribers} subscribers, {status.missed} missed, "
+            f"{status.lost} lost"
+        )
     return 0
 
 

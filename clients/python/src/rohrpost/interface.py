@@ -103,7 +103,9 @@ class Parameter:
     def resolve(self, owner: str, annotation: Any) -> None:
         """Its type is known."""
         if annotation is None:
-            raise Misuse(f"{owner}.{self.name}: a parameter needs its type, such as `{self.name}: float = parameter(…)`")
+            raise Misuse(
+                f"{owner}.{self.name}: a parameter needs its type, such as `{self.name}: float = parameter(…)`"
+            )
         type = type_of(annotation, f"{owner}.{self.name}")
         least, most = (bound_of(type, it, owner, self.name) for it in (self._words.min, self._words.max))
         self.field = Field(self.name.replace("_", "-"), type, self._words.text, self._words.unit, least, most)
@@ -199,7 +201,7 @@ class Module:
         if klass is None and base is not None:
             klass = base.description.klass
         if klass is None:
-            raise Misuse(f"{cls.__name__}: of which class is it? write `class {cls.__name__}(Module, klass=\"…\")`")
+            raise Misuse(f'{cls.__name__}: of which class is it? write `class {cls.__name__}(Module, klass="…")`')
         cls.interface_ = _interface(cls, klass, interface or cls.__name__)
 
     def switched_on(self) -> Any:
@@ -223,7 +225,7 @@ class Module:
 
     def _hosted(self) -> Host:
         if self._host is None:
-            raise Misuse(f"{type(self).__name__} is hosted by nobody yet; `client.host(\"name.0\", module)` does it")
+            raise Misuse(f'{type(self).__name__} is hosted by nobody yet; `client.host("name.0", module)` does it')
         return self._host
 
 

@@ -123,14 +123,18 @@ class Installation:
         try:
             tomllib = importlib.import_module("tomllib")
         except ImportError:
-            raise RuntimeError("Python 3.10 reads no TOML; give the classes by hand, or use Python 3.11 or later") from None
+            raise RuntimeError(
+                "Python 3.10 reads no TOML; give the classes by hand, or use Python 3.11 or later"
+            ) from None
         with open(path, "rb") as file:
             table: dict[str, Any] = tomllib.load(file)
         try:
             classes = {str(name): int(its["id"]) for name, its in table["classes"].items()}
             own = int(table["system"]["id"]) if system is None else system
         except (KeyError, TypeError, AttributeError, ValueError):
-            raise ValueError(f"{path}: `[classes]` with an `id` each, and `[system]` with its `id`, are needed") from None
+            raise ValueError(
+                f"{path}: `[classes]` with an `id` each, and `[system]` with its `id`, are needed"
+            ) from None
         return Installation.with_classes(own, classes, system_digest)
 
     def name(self, text: str | Name) -> Name:

@@ -153,8 +153,8 @@ class ReplyEnvelope:
 
 @dataclass(frozen=True)
 class DataHead:
-    """Before a value. ``stamp_ns``: system time at which it was true, ns since 1970; ``missed``: periods so far in which
-    nothing could be delivered; ``incarnation``: the subscriber's, 0 in data that nobody asked for."""
+    """Before a value. ``stamp_ns``: system time at which it was true, ns since 1970; ``missed``: periods so far in
+    which nothing could be delivered; ``incarnation``: the subscriber's, 0 in data that nobody asked for."""
 
     stamp_ns: int
     sequence: int

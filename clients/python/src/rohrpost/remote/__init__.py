@@ -16,8 +16,9 @@ import time
 
 from ..names import Installation, Name
 from .calling import NoSuchFunction
-from .client import Client, Proxy, Subscription
+from .client import Client
 from .following import Data, NoSuchData
+from .handles import Proxy, Subscription
 from .session import Settings
 from .timing import SystemTime
 from .transport import Tls
@@ -53,9 +54,9 @@ def connect(
 ) -> Client:
     """Takes part at the TCP router ``server`` (``host:port``), under the name ``own``.
 
-    The class of the name is the priority of all that is sent. ``label`` is for people. Waits ``timeout_s`` seconds until
-    it takes part, and raises :class:`rohrpost.NoConnection`, if it does not; with 0 it does not wait, and goes on trying
-    by itself. ``big_endian``: the byte order of its heads; ``quota_bytes``: of packages that wait for the stream.
+    The class of the name is the priority of all that is sent. ``label`` is for people. Waits ``timeout_s`` seconds
+    until it takes part, and raises :class:`rohrpost.NoConnection`, if it does not; with 0 it does not wait, and goes on
+    trying by itself. ``big_endian``: the byte order of its heads; ``quota_bytes``: of packages that wait for the stream.
     """
     name, settings, context = prepare(own, installation, tls, label, big_endian, quota_bytes)
     client = Client(server, name, settings, context)

@@ -95,9 +95,7 @@ class Caller:
         envelope = CallEnvelope(call.interface, self.incarnation, call.sequence, valid_us, age_us)
         body = envelope.to_bytes() + call.arguments
         sender = self.own.with_local(REPLIES).raw
-        command = package(
-            call.to.raw, sender, call.number, call.sequence & 0xFFFF, body, self.own.klass, call.options
-        )
+        command = package(call.to.raw, sender, call.number, call.sequence & 0xFFFF, body, self.own.klass, call.options)
         self._send(now_ns, command)
 
     def forget(self, call: Call) -> None:

@@ -6,28 +6,28 @@ All methods may be called from any thread.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import selectors
 import socket
 import ssl
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from ..common import Status
-from ..errors import CallError, Misuse, NoConnection, RohrpostError
+from ..errors import CallError, Misuse, NoConnection
 from ..interface import Module
 from ..names import Name
 from ..schema.description import Description
-from ..schema.tree import UNIT, Type
+from ..schema.tree import UNIT
 from .. import wire
 from . import calling
 from .calls import Call
 from .clock import passed_ns
 from .core import Core, Endpoint, not_connected
-from .following import Data, Following
+from .handles import ModuleHost, Proxy, Subscription
 from .session import Settings, Step
 from .timing import SystemTime
 from .transport import Plain, Sealed, Transport
@@ -46,7 +46,7 @@ class Client:
         self._mutex = threading.RLock()
         self._lock = threading.Condition(self._mutex)
         self._core = Core(settings, own, passed_ns, time.time_ns)
-        self._hosts: list[_ModuleHost] = []
+        self._hosts: list[ModuleHost] = []
         self._is_closed = False
         self._wake_out, self._wake_in = socket.socketpair()
         for end in (self._wake_in, self._wake_out):
@@ -78,8 +78,7 @@ class Client:
 
     def wait_until_up(self, timeout_s: float) -> None:
         """Waits until it takes part. Raises :class:`NoConnection` with what is in the way."""
-        self._check()
-        with self._lock:
+        with self._locked():
             if not self._lock.wait_for(lambda: self._core.session.is_up or self._is_closed, timeout_s):
                 raise not_connected(self._core)
 
@@ -104,6 +103,15 @@ class Client:
         if self._is_closed:
             raise Misuse("this client is closed")
 
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        """The lock, for what others ask. After a fork a thread that is not there any more may hold it: so the process
+        is asked first."""
+        self._check()
+        with self._lock:
+            self._check()
+            yield
+
     # Calls.
 
     def name(self, text: str | Name) -> Name:
@@ -122,8 +130,7 @@ class Client:
             box.append(result)
             done.set()
 
-        with self._lock:
-            self._check()
+        with self._locked():
             self._core.now_ns = passed_ns()
             self._core.describe(endpoint, to, int(timeout_s * 1e9), take)
         self._wake()
@@ -143,8 +150,7 @@ class Client:
 
     def _sent(self, endpoint: Endpoint, to: Name, prepared: calling.Prepared, timeout_s: float) -> Call:
         done = threading.Event()
-        with self._lock:
-            self._check()
+        with self._locked():
             now_ns = passed_ns()
             call = endpoint.caller.begin(
                 now_ns, to, prepared.number, prepared.interface, prepared.arguments, int(timeout_s * 1e9),
@@ -196,8 +202,7 @@ class Client:
 
     def time(self) -> SystemTime | None:
         """System time as the TCP router has it, with its error bound; none: it is not known."""
-        self._check()
-        with self._lock:
+        with self._locked():
             return self._core.time(passed_ns())
 
     # Data.
@@ -219,8 +224,7 @@ class Client:
         as ``rohrpost.Odometry``.
         """
         subscription = Subscription(self, 1 if newest else room)
-        with self._lock:
-            self._check()
+        with self._locked():
             self._core.now_ns = passed_ns()
             subscription._following = self._core.follow(
                 self._core.own, self.name(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
@@ -233,11 +237,10 @@ class Client:
 
     def host(self, name: str | Name, module: Module) -> None:
         """Hosts a module under this name until the client is closed. Its functions run in a thread of their own."""
-        with self._lock:
-            self._check()
+        with self._locked():
             if module._host is not None:
                 raise Misuse(f"{type(module).__name__} is hosted already; make another one")
-            host = _ModuleHost(self, self.name(name), module)
+            host = ModuleHost(self, self.name(name), module)
             self._hosts.append(host)
             module._host = host
         host.thread.start()
@@ -357,135 +360,3 @@ class _Line:
     def __init__(self, stream: socket.socket, transport: Transport) -> None:
         self.stream = stream
         self.transport = transport
-
-
-
-class Proxy:
-    """The functions of a module as methods, by its own description."""
-
-    def __init__(self, client: Client, endpoint: Endpoint, to: Name, timeout_s: float) -> None:
-        self._client, self._endpoint, self._to, self._timeout_s = client, endpoint, to, timeout_s
-
-    def __getattr__(self, function: str) -> Callable[..., Any]:
-        if function.startswith("__"):
-            raise AttributeError(function)
-
-        def call(*values: Any, **named: Any) -> Any:
-            return self._client._call_by_name(self._endpoint, self._to, function, values, named, self._timeout_s)
-
-        return call
-
-
-class Subscription:
-    """Data of a module as they come: ``for data in subscription``, or :meth:`next`. Ended by ``close`` or ``with``."""
-
-    _following: Following
-
-    def __init__(self, client: Client, room: int) -> None:
-        self._client = client
-        self._values: deque[Data] = deque(maxlen=max(1, room))
-        self._is_closed = False
-        self.problem: RohrpostError | None = None
-        """What is wrong at present, if anything is; it goes on trying."""
-        self.dropped = 0
-        """Values that gave way here, since nobody took them."""
-
-    @property
-    def lost(self) -> int:
-        """Values that should have come and did not."""
-        return self._following.lost
-
-    @property
-    def type(self) -> Type | None:
-        """The type of the values, once the module has described itself."""
-        return self._following.type
-
-    def _take(self, data: Data) -> None:
-        self.dropped += len(self._values) == self._values.maxlen
-        self._values.append(data)
-
-    def _said(self, problem: RohrpostError | None) -> None:
-        self.problem = problem
-
-    def next(self, timeout_s: float | None = None) -> Data:
-        """The next value. Raises what is in the way, or :class:`TimeoutError`, if none comes in time."""
-        self._client._check()
-        lock = self._client._lock
-        with lock:
-            lock.wait_for(lambda: self._values or self._is_closed or self._client._is_closed, timeout_s)
-            if self._values:
-                return self._values.popleft()
-            if self._is_closed or self._client._is_closed:
-                raise Misuse("this subscription is closed")
-            raise self.problem or TimeoutError(f"no data came within {timeout_s} s")
-
-    def __iter__(self) -> Iterator[Data]:
-        while not self._is_closed:
-            yield self.next()
-
-    def __enter__(self) -> Subscription:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Ends it."""
-        if self._is_closed or self._client._is_closed:
-            return
-        with self._client._lock:
-            self._is_closed = True
-            self._client._core.now_ns = passed_ns()
-            self._client._core.unfollow(self._client._core.own, self._following)
-            self._client._lock.notify_all()
-        self._client._wake()
-
-
-class _ModuleHost:
-    """Runs a module's own code in a thread."""
-
-    def __init__(self, client: Client, name: Name, module: Module) -> None:
-        self._client = client
-        self._turn = threading.Condition(client._mutex)
-        core = client._core
-        core.now_ns = passed_ns()
-        self._endpoint = core.host(core.now_ns, name, module, self._turn.notify_all)
-        core.follow_inputs(self._endpoint, lambda problem: None)
-        self.thread = threading.Thread(target=self._run, name=f"rohrpost {name}", daemon=True)
-
-    def _run(self) -> None:
-        hosted = self._endpoint.hosted
-        assert hosted is not None
-        while True:
-            with self._turn:
-                work = hosted.work.next()
-                while work is None:
-                    if self._client._is_closed:
-                        return
-                    self._turn.wait()
-                    work = hosted.work.next()
-            result, failed = None, None
-            try:
-                result = work.run()
-            except Exception as error:  # The author's code may raise anything; the module is in error then.
-                failed = error
-            with self._client._lock:
-                work.finish(passed_ns(), result, failed)
-            self._client._wake()
-
-    def stop(self) -> None:
-        with self._turn:
-            self._turn.notify_all()
-        if self.thread is not threading.current_thread():
-            self.thread.join(1.0)
-
-    def publish(self, module: Module, data: str, value: Any, time_ns: int | None) -> None:
-        self._client._check()
-        hosted = self._endpoint.hosted
-        assert hosted is not None
-        with self._client._lock:
-            hosted.publish(passed_ns(), data, value, time_ns)
-        self._client._wake()
-
-    def proxy(self, module: Module, name: str) -> Proxy:
-        return Proxy(self._client, self._endpoint, self._client.name(name), 1.0)

@@ -47,8 +47,8 @@ class Endpoint:
 
 
 class Core:
-    """See above. ``monotonic_ns``: only for how long a command has waited when its turn comes; ``wall_ns``: ns since 1970
-    by this computer, for incarnations, and for stamps where system time is not known."""
+    """See above. ``monotonic_ns``: only for how long a command has waited when its turn comes; ``wall_ns``: ns since
+    1970 by this computer, for incarnations, and for stamps where system time is not known."""
 
     def __init__(
         self, settings: Settings, own: Name, monotonic_ns: Callable[[], int], wall_ns: Callable[[], int]
@@ -88,9 +88,7 @@ class Core:
         endpoint = self.own if name == self.own.name and self.own.hosted is None else self.add(now_ns, name)
         work = WorkQueue(wake)
         own = incarnation(self._wall_ns())
-        endpoint.hosted = Hosted(
-            name, module, now_ns, own, self.session.send, self.stamp, work, self._monotonic_ns
-        )
+        endpoint.hosted = Hosted(name, module, now_ns, own, self.session.send, self.stamp, work, self._monotonic_ns)
         return endpoint
 
     def follow_inputs(self, endpoint: Endpoint, problem: Callable[[RohrpostError | None], None]) -> None:

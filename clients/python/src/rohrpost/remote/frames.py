@@ -114,9 +114,7 @@ def _frame(kind: int, rest: bytes, hops: int = 0) -> bytes:
     return struct.pack("<IBBH", len(rest), kind, hops, 0) + rest
 
 
-def hello(
-    system: int, digests: tuple[int, int], incarnation: int, attempt: int, now_ns: int, name: str
-) -> bytes:
+def hello(system: int, digests: tuple[int, int], incarnation: int, attempt: int, now_ns: int, name: str) -> bytes:
     """The first frame of a connection."""
     front = struct.pack("<4sBBBBQQQQQ", MAGIC, VERSION, system, 0, 0, *digests, incarnation, attempt, now_ns)
     return _frame(HELLO, front + name.encode())

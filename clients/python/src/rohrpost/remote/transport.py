@@ -121,7 +121,9 @@ class Sealed:
 def _words(error: ssl.SSLError) -> str:
     reason = (error.reason or str(error)).lower().replace("_", " ")
     if isinstance(error, ssl.SSLCertVerificationError):
-        return f"the certificate of the TCP router is not believed: {error.verify_message}; is `ca.pem` its authority's?"
+        return (
+            f"the certificate of the TCP router is not believed: {error.verify_message}; is `ca.pem` its authority's?"
+        )
     if "alert" in reason:
         return f"the TCP router refuses this end's certificate: {reason}; use that of this node (`rohrpost keys new`)"
     if "wrong version number" in reason or "record layer" in reason:

@@ -92,9 +92,7 @@ class _Encoder:
             self.out.append(value)
         elif type in (F32, F64):
             self.out += struct.pack("<f" if type == F32 else "<d", _float(type, value))
-        elif (type == TEXT and isinstance(value, str)) or (
-            type == CHAR and isinstance(value, str) and len(value) == 1
-        ):
+        elif (type == TEXT and isinstance(value, str)) or (type == CHAR and isinstance(value, str) and len(value) == 1):
             self.text(type, value)
         elif type == BYTES and isinstance(value, _BYTES):
             self.counted(bytes(value))
