@@ -128,9 +128,8 @@ class Peer(wire.Session):
 class Live:
     """The cases; each method that begins with `case_` is one."""
 
-    def __init__(self, client, peer, hash):
-        self.client, self.peer, self.hash = client, peer, hash
-        self.to = wire.name(OWN)
+    def __init__(self, client, peer, hash, hosts):
+        self.client, self.peer, self.hash, self.to = client, peer, hash, wire.name(hosts)
 
     def call(self, timeout_ms=5000, number=DOUBLE, arguments=b"\x15"):
         self.client.tell({
@@ -145,9 +144,9 @@ class Live:
     def case_a_call_has_the_bytes_of_the_page_and_its_result_comes_back(self):
         self.call()
         its = self.peer.command(DOUBLE)
-        require(its.sender == self.to | 1, "it is sent from local id 1")
+        require(its.sender & 0xFF == 1, "it is sent from local id 1")
         require(its.id == its.sequence & 0xFFFF, "the id is the lower half of the sequence")
-        require(its.priority == 96, f"the priority is the class, not {its.priority}")
+        require(its.priority == its.sender >> 16 & 0xFF, f"the priority is the class, not {its.priority}")
         require(its.age_us == 0, "a first try has age 0")
         require(its.valid_us == 5_000_000, f"it is valid for 5 s, not {its.valid_us} us")
         require((its.interface, its.arguments) == (self.hash, b"\x15"), "interface and arguments")
@@ -155,7 +154,7 @@ class Live:
         self.heard({"result": "2a"})
 
     def case_a_call_is_repeated_with_the_same_number_until_its_answer_comes(self):
-        self.call(timeout_ms=1500)
+        self.call(timeout_ms=3000)
         first, second = self.peer.command(DOUBLE), self.peer.command(DOUBLE)
         require((first.incarnation, first.sequence) == (second.incarnation, second.sequence), "the same call")
         require(first.arguments == second.arguments and second.age_us > 0, f"an age: {second.age_us}")
@@ -163,7 +162,7 @@ class Live:
         self.heard({"result": "2a"})
 
     def case_a_call_without_an_answer_ends_after_three_tries(self):
-        self.call(timeout_ms=600)
+        self.call(timeout_ms=1800)
         ages = [self.peer.command(DOUBLE).age_us for _ in range(3)]
         require(ages == sorted(ages) and ages[0] == 0, f"{ages}")
         self.heard({"timeout": True})
@@ -175,7 +174,7 @@ class Live:
             self.heard({"fault": number})
 
     def case_a_fault_of_one_try_does_not_end_a_call_that_was_repeated(self):
-        self.call(timeout_ms=1500)
+        self.call(timeout_ms=3000)
         self.peer.command(DOUBLE)
         again = self.peer.command(DOUBLE)
         self.peer.reply(again, wire.varint(BUSY), wire.ERROR)
@@ -309,7 +308,7 @@ class Live:
         raise Wrong("it still has subscribers")
 
     def case_a_subscription_ends_with_its_lease(self):
-        require(self.peer.ask(self.to, wire.SUBSCRIBE, self.hash, self.wish(6, lease_ms=300))[0] is None, "taken")
+        require(self.peer.ask(self.to, wire.SUBSCRIBE, self.hash, self.wish(6, lease_ms=1000))[0] is None, "taken")
         self.data()
         self.none_left()
 
@@ -354,7 +353,7 @@ class Live:
 
     def case_it_knows_system_time_as_well_as_its_bound_says(self):
         got = self.client.ask({"do": "time"})["ok"]
-        require(got["error_ns"] > 0, f"{got}")
+        require(got["error_ns"] >= 0, f"{got}")
         off = abs(got["ns"] - time.time_ns())
         # Of this computer, or of one that is set by the same clocks.
         require(off < 10_000_000_000, f"{off / 1e9} s off this computer's clock")
@@ -379,7 +378,8 @@ def check(client, server, digests):
         if "ok" not in got:
             yield f"it takes part, {order}", f"{got}"
             return
-        live = Live(client, peer, hash)
+        told = got["ok"] if isinstance(got["ok"], dict) else {}
+        live = Live(client, peer, hash, told.get("hosts", OWN))
         for name in [name for name in dir(live) if name.startswith("case_")]:
             problem = ""
             try:
