@@ -1,5 +1,5 @@
-//! Rust under the live cases of the conformance suite: a module, and a client that calls as a tool does, on a node. What
-//! they exchange with the suite goes through the node's client of the TCP router.
+//! Rust under the live cases of the conformance suite: a module, and a client that calls as a tool does, on a node.
+//! What they exchange with the suite goes through the node's client of the TCP router.
 //!
 //! Both are this test program itself, as the probe is.
 

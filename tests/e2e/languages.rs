@@ -1,6 +1,6 @@
-//! Programs in Python at a robot: on a laptop in a network namespace of its own, with Python and `clients/python` alone.
-//! The robot is on `base`; its file knows the laptop as a node that the TCP router reaches, and nothing is launched
-//! there.
+//! Programs in Python at a robot: on a laptop in a network namespace of its own, with Python and `clients/python`
+//! alone. The robot is on `base`; its file knows the laptop as a node that the TCP router reaches, and nothing is
+//! launched there.
 
 use crate::conforming;
 use crate::harness::{Place, Robot, signal, wait};
@@ -113,8 +113,8 @@ fn configured(security: &str) -> String {
     let map = repository().join("config/building.map");
     format!(
         "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nmotor = {{ id = 200 }}\n\
-         odometry = {{ id = 160 }}\nlaser = {{ id = 150 }}\ngripper = {{ id = 110 }}\nprobe = {{ id = 96 }}\ntcp = {{ id = 64 }}\n\
-         output = {{ id = 32 }}\ntool = {{ id = 16 }}\n[scheduling]\nreal-time-from = 256\n\
+         odometry = {{ id = 160 }}\nlaser = {{ id = 150 }}\ngripper = {{ id = 110 }}\nprobe = {{ id = 96 }}\n\
+         tcp = {{ id = 64 }}\noutput = {{ id = 32 }}\ntool = {{ id = 16 }}\n[scheduling]\nreal-time-from = 256\n\
          [nodes.base]\ntools = [0, 15]\n[nodes.laptop]\nnetwork = \"tcp\"\ntools = [64, 127]\n\
          [tcp]\n{security}\naddress = \"{}\"\nserver = \"base\"\n\
          [[module]]\nname = \"motor.0\"\nnode = \"base\"\naliases = [\"odometry.0\", \"laser.0\"]\nbuiltin = \"sim\"\n\

@@ -134,7 +134,7 @@ fn recordings() -> Result<(), Failure> {
     )
 }
 
-/// Types, strictly; then as its users have it: installed by pip. (Its tests also run in `rohrpost-modules`, uninstalled.)
+/// Types, strictly; then as its users have it: installed by pip. (Tests of `rohrpost-modules` run it uninstalled.)
 fn python_client() -> Result<(), Failure> {
     let (python, folder) = (venv::clients()?, cargo::root().join("clients/python"));
     let run = |why: &str, arguments: &[&str]| {

@@ -311,10 +311,9 @@ class Client:
                 self._write(line)
                 events = selectors.EVENT_READ | (selectors.EVENT_WRITE if line.transport.pending() else 0)
                 selector.modify(line.stream, events)
-            ready = self._core.session.ready() if line is not None and line.transport.is_ready else b""
-            wait_ns = 0 if ready and line and not line.transport.pending() else until_ns - passed_ns()
-            if step is Step.WRITE and line is not None and line.transport.pending():
-                wait_ns = 100_000_000
+            takes_more = line is not None and line.transport.is_ready and not line.transport.pending()
+            # A stream that takes nothing now, or is not sealed yet, is looked at again when something comes.
+            wait_ns = until_ns - passed_ns() if step is Step.WAIT else 0 if takes_more else 100_000_000
             for key, _ in selector.select(max(0.0, min(wait_ns, 250_000_000) / 1e9)):
                 if key.fileobj is self._wake_in:
                     self._wake_in.recv(4096)
