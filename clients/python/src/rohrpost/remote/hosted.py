@@ -32,7 +32,8 @@ _COMMON_ARGUMENTS: dict[int, Type] = {
     wire.OUTPUT_LEVEL: tree.U8, wire.DESCRIBE: tree.U32, wire.PARAMETERS: tree.U16, wire.EXCHANGE: tree.U16,
 }  # fmt: skip
 _OF_INTERFACE = (wire.GET_DATA, wire.SUBSCRIBE)
-_IDEMPOTENT = (wire.OFF, wire.ON)
+_WORK = (wire.ON, wire.OFF, wire.SET_PARAMETERS)
+"""Common functions that run the module's own code."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class Hosted:
             head.sender, envelope.incarnation, envelope.sequence, envelope.valid_us * 1000, envelope.age_us * 1000,
             redelivered, idempotent,
         )  # fmt: skip
-        if self.work.is_full and number >= wire.FIRST_OWN:
+        if self.work.is_full and (number >= wire.FIRST_OWN or number in _WORK):
             return self._reply(now_ns, head, envelope, True, Fault(faults.MAILBOX_FULL).to_bytes())
         decision = self._served.decide(request, now_ns)
         if isinstance(decision, Fault):
