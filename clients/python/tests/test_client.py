@@ -16,7 +16,7 @@ from typing import Any
 import rohrpost as rp
 from rohrpost import remote
 from rohrpost.common import SetParameters, type_of_class
-from rohrpost.faults import ARGUMENTS, INTERRUPTED, MODULE_ERROR, MODULE_OFF
+from rohrpost.faults import ARGUMENTS, INTERFACE_DIFFERS, INTERRUPTED, MODULE_ERROR, MODULE_OFF
 from rohrpost.remote import aio
 from rohrpost.remote.parameters import _SET
 from rohrpost.schema import decode, encode
@@ -173,6 +173,38 @@ class Clients(unittest.TestCase):
             self.probe.publish("word", 5)
         with self.assertRaisesRegex(rp.Misuse, "Probe.word: 70003 bytes"):
             self.probe.publish("word", "x" * 70_000)
+
+    def test_a_module_that_was_replaced_by_one_with_another_interface_is_asked_anew(self) -> None:
+        class First(rp.Module, klass="probe"):
+            @rp.data_out(1, rate_hz=50)
+            def beat(self) -> int:
+                return 1
+
+            @rp.command(16)
+            def one(self) -> int:
+                return 1
+
+        class Second(rp.Module, klass="probe"):
+            @rp.data_out(7, rate_hz=50)
+            def beat(self) -> str:
+                return "two"
+
+            @rp.command(20)
+            def one(self) -> str:
+                return "two"
+
+        first = self.connected("probe.3")
+        first.host("probe.3", First())
+        with self.client.subscribe("probe.3", "beat") as beats:
+            self.assertEqual(beats.next(20).value, 1)
+            self.assertEqual(self.client.call("probe.3", "one", timeout_s=20), 1)
+            first.close()
+            self.connected("probe.3").host("probe.3", Second())
+            with self.assertRaises(rp.CallFault) as fault:
+                self.client.call("probe.3", "one", timeout_s=20)
+            self.assertEqual(fault.exception.fault.number, INTERFACE_DIFFERS)
+            self.assertEqual(self.client.call("probe.3", "one", timeout_s=20), "two")
+            wait(lambda: beats.next(20).value == "two")
 
     def test_data_of_another_type_are_told(self) -> None:
         with self.client.subscribe("probe.0", "beat", expected=rp.Odometry) as wrong:
