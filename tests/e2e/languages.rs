@@ -59,7 +59,12 @@ impl Scene {
         };
         let robot = place.robot(&config, "base", &mut launch);
         robot.wait_on(&mut launch);
-        Some(Self { launch, robot, place, lab })
+        let scene = Self { launch, robot, place, lab };
+        wait("the robot's modules are at the TCP router", || {
+            let net: serde_json::Value = serde_json::from_str(scene.says(&["net", "--json"]).out.trim()).ok()?;
+            (net[0]["beyond"]["state"] == "up").then_some(())
+        });
+        Some(scene)
     }
 
     /// Python on the laptop.
@@ -175,10 +180,11 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
 #[test]
 fn what_the_tools_print_python_prints_on_the_laptop() {
     let Some(scene) = Scene::launched(OPEN) else { return };
-    let hosts = scene.prints(&["list"]).ok();
-    let expected = ["motor.0", "odometry.0", "tcp.255"];
-    let has = |module: &str| hosts.lines().any(|line| line.starts_with(module) && line.ends_with("node base of robot"));
-    assert!(expected.into_iter().all(has), "{hosts}");
+    wait("all are in the list, which the TCP router makes anew now and then", || {
+        let hosts = scene.prints(&["list"]).ok();
+        let has = |module| hosts.lines().any(|line| line.starts_with(module) && line.ends_with("node base of robot"));
+        ["motor.0", "odometry.0", "tcp.255"].into_iter().all(has).then_some(())
+    });
     assert!(scene.prints(&["status", "motor.0"]).ok().starts_with("motor.0 is on\n"));
     assert_eq!(scene.prints(&["call", "motor.0.drive", "0.3", "-0.1"]).ok(), "ok\n");
     let refused = scene.prints(&["call", "motor.0.drive", "nan", "0"]);
