@@ -71,7 +71,7 @@ const PRODUCT: Stage = Stage {
     },
 };
 
-const ALL: [Stage; 7] = [
+const ALL: [Stage; 8] = [
     Stage {
         name: "tests of all but the GUI bridge",
         budget: 25,
@@ -93,6 +93,7 @@ const ALL: [Stage; 7] = [
     },
     Stage { name: "drawings, with Rerun's command line", budget: 5, run: || whole(drawings()) },
     Stage { name: "recordings, with Python's reader", budget: 2, run: || whole(recordings()) },
+    Stage { name: "the client in Python, installed, with mypy", budget: 2, run: || whole(python_client()) },
 ];
 
 /// A stage without parts.
@@ -131,6 +132,19 @@ fn recordings() -> Result<(), Failure> {
         "testing recordings with Python's reader and Rerun's converter",
         tests(&test).env("ROHRPOST_MCAP_PYTHON", python).env("ROHRPOST_RERUN", rerun),
     )
+}
+
+/// Types, strictly; then as its users have it: installed by pip. (Tests of `rohrpost-modules` run it uninstalled.)
+fn python_client() -> Result<(), Failure> {
+    let (python, folder) = (venv::clients()?, cargo::root().join("clients/python"));
+    let run = |why: &str, arguments: &[&str]| {
+        cargo::run(why, Command::new(&python).arg("-B").args(arguments).current_dir(&folder))
+    };
+    let cache = cargo::target().join("mypy");
+    run("checking types of the client in Python", &["-m", "mypy", "--cache-dir", &cache.to_string_lossy()])?;
+    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-build-isolation"];
+    run("installing the client in Python", &[&install[..], &["--force-reinstall", "."]].concat())?;
+    run("testing the client in Python, installed", &["-m", "unittest", "discover", "-t", ".", "-s", "tests"])
 }
 
 /// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the

@@ -1,5 +1,5 @@
 //! Programs of others that tests need, from PyPI: Rerun's command line and viewer in `target/venv`, a reader of MCAP
-//! files in `target/venv-mcap`.
+//! files in `target/venv-mcap`, mypy in `target/venv-clients`.
 //!
 //! Rerun's version is that of the `rerun` crate: a viewer reads drawings of its own version best.
 
@@ -12,6 +12,9 @@ use std::process::Command;
 const PACKAGE: &str = "rerun-sdk==0.36.3";
 /// The library of the makers of the format, in Python, with what it needs to decompress, and to decode protobuf.
 const MCAP_PACKAGES: &str = "mcap==1.6.0 mcap-protobuf-support==0.6.0 protobuf==7.36.2";
+
+/// What checks the types of the client in Python, and what builds its package.
+const CLIENT_PACKAGES: &str = "mypy==1.13.0 hatchling==1.27.0";
 
 /// A Python with Rerun in it.
 pub(crate) struct Venv {
@@ -34,6 +37,11 @@ pub(crate) fn venv() -> Result<Venv, Failure> {
 /// A Python that reads MCAP files; finds it, or makes it.
 pub(crate) fn mcap() -> Result<PathBuf, Failure> {
     python_with("venv-mcap", MCAP_PACKAGES, "a reader of MCAP files", |_| Ok(()))
+}
+
+/// A Python for the client in `clients/python`; finds it, or makes it.
+pub(crate) fn clients() -> Result<PathBuf, Failure> {
+    python_with("venv-clients", CLIENT_PACKAGES, "a checker of types, mypy", |_| Ok(()))
 }
 
 /// The interpreter of an environment with packages, which stand in one line.

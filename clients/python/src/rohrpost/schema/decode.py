@@ -1,0 +1,198 @@
+"""From bytes to values.
+
+| type | here |
+| --- | --- |
+| unit, none of an option | ``None`` |
+| some of an option | the value; where that itself can be ``None``: ``Variant("Some", value)`` |
+| numbers, bool, text, character | ``int``, ``float``, ``bool``, ``str`` |
+| bytes, list of u8 | ``bytes`` |
+| other lists, arrays, tuples | ``list``; of a Python annotation ``tuple[…]`` a ``tuple`` |
+| struct | its Python class; ``dict`` where there is none |
+| map | ``dict``; with keys that are no words a list of pairs |
+| enum | its Python class; :class:`Variant` where there is none |
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+from .errors import WalkError, counted
+from .tree import (
+    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
+    Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
+)  # fmt: skip
+
+
+def decode(type: Type, data: bytes) -> Any:
+    """The value that all of ``data`` holds. Raises :class:`WalkError`, with the path to where it showed."""
+    value, left = decode_front(type, data)
+    if left:
+        raise WalkError(f"{counted(left, 'byte')} too many")
+    return value
+
+
+def decode_front(type: Type, data: bytes) -> tuple[Any, int]:
+    """The value that ``data`` begins with, and how many bytes are left."""
+    decoder = _Decoder(data)
+    value = decoder.value(type)
+    return value, len(data) - decoder.at
+
+
+class _Decoder:
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.at = 0
+        self.depth = 0
+        self.empty_left = EMPTY_MAX
+
+    def value(self, type: Type) -> Any:
+        if self.depth >= DEPTH_MAX:
+            raise WalkError(f"nested more than {DEPTH_MAX} deep")
+        before = self.at
+        self.depth += 1
+        value = self.unbounded(unwrapped(type))
+        self.depth -= 1
+        if self.at == before:
+            self.empty_left -= 1
+            if self.empty_left < 0:
+                raise WalkError(f"more than {EMPTY_MAX} values that take no bytes")
+        return value
+
+    def unbounded(self, type: Type) -> Any:
+        if isinstance(type, Plain):
+            return self.plain(type)
+        if isinstance(type, Option):
+            if not self.flag():
+                return None
+            inner = self.value(type.inner)
+            return Variant("Some", inner) if is_nullable(type.inner) else inner
+        if isinstance(type, List):
+            if is_byte(type.element):
+                return self.counted()
+            length = self.length(type.is_of_empty)
+            return [self.element(type.element, index) for index in range(length)]
+        if isinstance(type, Array):
+            return [self.element(type.element, index) for index in range(type.length)]
+        if isinstance(type, Tuple):
+            return tuple(self.element(element, index) for index, element in enumerate(type.elements))
+        if isinstance(type, Map):
+            return self.map(type)
+        if isinstance(type, Struct):
+            return self.struct(type)
+        return self.enum(type)
+
+    def plain(self, type: Plain) -> Any:
+        if type.integer:
+            return self.integer(*type.integer)
+        if type == BOOL:
+            return self.flag()
+        if type == F64:
+            return struct.unpack("<d", self.take(8))[0]
+        if type == F32:
+            return struct.unpack("<f", self.take(4))[0]
+        if type == TEXT:
+            return self.text()
+        if type == BYTES:
+            return self.counted()
+        if type == CHAR:
+            text = self.text()
+            if len(text) != 1:
+                raise WalkError("not exactly one character")
+            return text
+        return None
+
+    def element(self, type: Type, index: int) -> Any:
+        try:
+            return self.value(type)
+        except WalkError as error:
+            raise error.within(f"[{index}]") from None
+
+    def member(self, type: Type, name: str) -> Any:
+        try:
+            return self.value(type)
+        except WalkError as error:
+            raise error.within(name) from None
+
+    def members(self, named: Named) -> Any:
+        if named.kind == 0:
+            return None
+        if named.kind == 1:
+            return self.value(named.fields[0].type)
+        if named.kind == 2:
+            return tuple(self.element(field.type, index) for index, field in enumerate(named.fields))
+        return {field.name: self.member(field.type, field.name) for field in named.fields}
+
+    def struct(self, type: Struct) -> Any:
+        members = self.members(type.named)
+        return members if type.python is None else type.python(**(members or {}))
+
+    def map(self, type: Map) -> Any:
+        length = self.length(False)
+        if not type.has_words:
+            return [self.element(Tuple((type.key, type.value)), index) for index in range(length)]
+        entries: dict[Any, Any] = {}
+        for index in range(length):
+            key = self.element(type.key, index)
+            entries[key] = self.member(type.value, key.name if isinstance(key, Variant) else str(key))
+        return entries
+
+    def enum(self, type: Enum) -> Any:
+        index = self.varint(32)
+        if index >= len(type.variants):
+            raise WalkError(f"variant number {index}, but only {counted(len(type.variants), 'variant')} known")
+        variant = type.variants[index]
+        try:
+            payload = self.members(variant)
+        except WalkError as error:
+            raise error.within(variant.name) from None
+        return Variant(variant.name, payload) if type.python is None else type.python(variant.name, payload)
+
+    def length(self, is_of_empty: bool) -> int:
+        claimed, left = self.varint(64), len(self.data) - self.at
+        if is_of_empty and claimed > self.empty_left:
+            raise WalkError(f"more than {EMPTY_MAX} values that take no bytes")
+        if not is_of_empty and claimed > left:
+            raise WalkError(f"claims {claimed} elements, but only {counted(left, 'byte')} left")
+        return claimed
+
+    def integer(self, signed: bool, bits: int) -> int:
+        if bits == 8:
+            byte = self.take(1)[0]
+            return byte - 256 if signed and byte > 127 else byte
+        number = self.varint(bits)
+        return number >> 1 ^ -(number & 1) if signed else number
+
+    def varint(self, bits: int) -> int:
+        number = 0
+        for shift in range(0, bits, 7):
+            byte = self.take(1)[0]
+            seven = byte & 0x7F
+            if bits - shift < 7 and seven >> (bits - shift):
+                break
+            number |= seven << shift
+            if byte < 0x80:
+                return number
+        raise WalkError(f"a number that does not fit {bits} bits")
+
+    def text(self) -> str:
+        try:
+            return self.counted().decode()
+        except UnicodeDecodeError:
+            raise WalkError("text that is not UTF-8") from None
+
+    def flag(self) -> bool:
+        byte = self.take(1)[0]
+        if byte > 1:
+            raise WalkError(f"expected a byte 0 or 1, got {byte}")
+        return byte == 1
+
+    def counted(self) -> bytes:
+        return self.take(self.varint(64))
+
+    def take(self, length: int) -> bytes:
+        missing = length - (len(self.data) - self.at)
+        if missing > 0:
+            raise WalkError(f"{counted(missing, 'byte')} missing")
+        self.at += length
+        return self.data[self.at - length : self.at]

@@ -1,0 +1,333 @@
+"""Both clients over real sockets, at a router of this test."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+import unittest
+from collections.abc import Callable
+from typing import Any
+
+import rohrpost as rp
+from rohrpost import remote
+from rohrpost.common import SetParameters, type_of_class
+from rohrpost.faults import ARGUMENTS, INTERFACE_DIFFERS, INTERRUPTED, MODULE_ERROR, MODULE_OFF
+from rohrpost.remote import aio
+from rohrpost.remote.parameters import _SET
+from rohrpost.schema import decode, encode
+
+from .modules import INSTALLATION, Probe, Refused
+from .router import Server
+
+
+def wait(is_so: Callable[[], Any]) -> Any:
+    """Until it is so; a busy computer takes its time."""
+    until = time.monotonic() + 30
+    while time.monotonic() < until:
+        found = is_so()
+        if found:
+            return found
+        time.sleep(0.005)
+    raise AssertionError("waited in vain")
+
+
+class Clients(unittest.TestCase):
+    def setUp(self) -> None:
+        self.server = Server()
+        self.addCleanup(self.server.close)
+        self.probe = Probe()
+        self.host = self.connected("probe.0")
+        self.host.host("probe.0", self.probe)
+        self.client = self.connected("tool.1")
+
+    def connected(self, own: str, **how: Any) -> remote.Client:
+        client = remote.connect(self.server.address, own, INSTALLATION, timeout_s=20, **how)
+        self.addCleanup(client.close)
+        return client
+
+    def call(self, function: str, *values: Any) -> Any:
+        return self.client.call("probe.0", function, *values, timeout_s=20)
+
+    def test_faults_and_errors_are_exceptions(self) -> None:
+        self.assertEqual(self.call("count", 2), 2)
+        self.assertEqual(self.client.proxy("probe.0", 20).count(by=3), 5)
+        with self.assertRaises(rp.FunctionError) as refused:
+            self.call("refuse", "no")
+        value = refused.exception.value
+        self.assertEqual(Refused(value.name, value.value), Refused("Because", "no"))
+        for values, why in [((), "takes by"), ((-1,), "by: -1 is out of range"), ((1, 2), "takes by")]:
+            with self.assertRaisesRegex(rp.BadArguments, why):
+                self.call("count", *values)
+        with self.assertRaisesRegex(remote.NoSuchFunction, "it has: count, refuse, fail, wait, wrong"):
+            self.call("fly")
+        with self.assertRaisesRegex(rp.CallFault, "its result cannot be written: 300 is out of range"):
+            self.call("wrong")
+        with self.assertRaises(rp.CallTimeout) as late:
+            self.client.status("probe.9", timeout_s=0.2)
+        self.assertEqual(
+            str(late.exception), "no answer from 7.96.9.0 within 200ms; does it run, and is it not too busy?"
+        )
+        with self.assertRaises(rp.CallFault) as fault:
+            self.client.command("probe.0", 16, self.client.describe("probe.0").hash, b"", 20)
+        self.assertEqual(fault.exception.fault.number, ARGUMENTS)
+
+    def test_what_is_lost_or_doubled_on_the_way_runs_once(self) -> None:
+        turn = iter(range(10**9))
+        # Each package is lost, comes once or comes twice.
+        self.server.router.sees = lambda package: next(turn) % 3
+        answered = 0
+        for _ in range(30):
+            try:
+                self.client.call("probe.0", "count", 1, timeout_s=0.6)
+                answered += 1
+            except rp.CallTimeout:
+                continue
+            except rp.CallFault as error:
+                # A server that has just begun cannot know whether one before it has run a repeat.
+                self.assertEqual(error.fault.number, INTERRUPTED)
+        self.server.router.sees = lambda package: 1
+        counted = self.call("count", 0)
+        self.assertGreater(answered, 0)
+        self.assertTrue(answered <= counted <= 30, f"{answered} answered, {counted} run")
+
+    def test_a_module_that_fails_takes_no_commands_until_it_is_switched(self) -> None:
+        with self.assertRaises(rp.CallFault) as fault:
+            self.call("fail")
+        self.assertEqual(fault.exception.fault.number, MODULE_ERROR)
+        self.assertEqual(str(fault.exception), "7.96.0.0: the module is in error: RuntimeError: broken\\n\\u{1b}[31m")
+        with self.assertRaises(rp.CallFault):
+            self.call("count", 1)
+        status = self.client.status("probe.0", 20)
+        self.assertEqual((status.state, status.error), (rp.State.Error, "RuntimeError: broken\\n\\u{1b}[31m"))
+        self.client.switch("probe.0", False, 20)
+        with self.assertRaises(rp.CallFault) as fault:
+            self.call("count", 1)
+        self.assertEqual(fault.exception.fault.number, MODULE_OFF)
+        self.client.switch("probe.0", True, 20)
+        self.assertEqual(self.call("count", 1), 1)
+        self.assertEqual(self.probe.changes, ["on", "off", "on"])
+
+    def test_a_command_that_waited_too_long_behind_another_is_not_run(self) -> None:
+        busy = threading.Thread(target=lambda: self.call("wait"))
+        busy.start()
+        wait(lambda: self.probe.waits)
+        other = self.connected("tool.2")
+        with self.assertRaises(rp.CallTimeout):
+            other.call("probe.0", "count", 1, timeout_s=0.3)
+        over_ns = time.monotonic_ns() + 300_000_000
+        wait(lambda: time.monotonic_ns() > over_ns)
+        self.probe.may_go.set()
+        busy.join()
+        self.assertEqual(self.call("count", 0), 0)
+
+    def test_threads_share_a_client(self) -> None:
+        wrong: list[object] = []
+
+        def work() -> None:
+            proxy = self.client.proxy("probe.0", 20)
+            for _ in range(50):
+                try:
+                    proxy.count(1)
+                except rp.TooManyCalls:
+                    wrong.append("too many")
+                except BaseException as error:  # Whatever it is, the test has to see it.
+                    wrong.append(error)
+
+        threads = [threading.Thread(target=work) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(wrong, [])
+        self.assertEqual(self.call("count", 0), 400)
+
+    def test_more_calls_than_a_server_remembers_are_refused(self) -> None:
+        calls = [threading.Thread(target=lambda: self.call("wait")) for _ in range(8)]
+        self.client.describe("probe.0", 20)
+        for call in calls:
+            call.start()
+        wait(lambda: len(self.client._core.own.caller._calls) == 8)
+        with self.assertRaisesRegex(rp.TooManyCalls, "too many calls to 7.96.0.0 are under way"):
+            self.call("count", 1)
+        self.probe.may_go.set()
+        for call in calls:
+            call.join()
+
+    def test_data_come_and_go_on_after_an_outage(self) -> None:
+        with self.client.subscribe("probe.0", "beat") as beats:
+            self.assertEqual([beats.next(20).sequence for _ in range(3)], [0, 1, 2])
+            self.server.drop_all()
+            wait(lambda: self.client.connections > 1 and self.host.connections > 1)
+            before = self.call("count", 7)
+            wait(lambda: beats.next(20).value == before)
+        self.probe.publish("word", "hello", 123)
+        self.assertEqual(self.client.get("probe.0", "word", 20), (123, "hello"))
+        with self.assertRaisesRegex(rp.Misuse, "Probe has no data `text`; it has: beat, word"):
+            self.probe.publish("text", "")
+        with self.assertRaisesRegex(rp.Misuse, "value: expected text, got `5`"):
+            self.probe.publish("word", 5)
+        with self.assertRaisesRegex(rp.Misuse, "Probe.word: 70003 bytes"):
+            self.probe.publish("word", "x" * 70_000)
+
+    def test_a_module_that_was_replaced_by_one_with_another_interface_is_asked_anew(self) -> None:
+        class First(rp.Module, klass="probe"):
+            @rp.data_out(1, rate_hz=50)
+            def beat(self) -> int:
+                return 1
+
+            @rp.command(16)
+            def one(self) -> int:
+                return 1
+
+        class Second(rp.Module, klass="probe"):
+            @rp.data_out(7, rate_hz=50)
+            def beat(self) -> str:
+                return "two"
+
+            @rp.command(20)
+            def one(self) -> str:
+                return "two"
+
+        first = self.connected("probe.3")
+        first.host("probe.3", First())
+        with self.client.subscribe("probe.3", "beat") as beats:
+            self.assertEqual(beats.next(20).value, 1)
+            self.assertEqual(self.client.call("probe.3", "one", timeout_s=20), 1)
+            first.close()
+            self.connected("probe.3").host("probe.3", Second())
+            with self.assertRaises(rp.CallFault) as fault:
+                self.client.call("probe.3", "one", timeout_s=20)
+            self.assertEqual(fault.exception.fault.number, INTERFACE_DIFFERS)
+            self.assertEqual(self.client.call("probe.3", "one", timeout_s=20), "two")
+            wait(lambda: beats.next(20).value == "two")
+
+    def test_data_of_another_type_are_told(self) -> None:
+        with self.client.subscribe("probe.0", "beat", expected=rp.Odometry) as wrong:
+            with self.assertRaisesRegex(remote.NoSuchData, "data `beat` are u64, and not {pose"):
+                wait(lambda: wrong.next(0.2))
+        with self.client.subscribe("probe.0", "heat") as missing:
+            with self.assertRaisesRegex(remote.NoSuchData, "no data `heat`; it has: beat, word"):
+                wait(lambda: missing.next(0.2))
+
+    @unittest.skipUnless(hasattr(os, "fork"), "no fork here")
+    def test_a_forked_child_is_told_to_open_its_own(self) -> None:
+        read, write = os.pipe()
+        pid = os.fork()
+        if pid == 0:
+            try:
+                self.client.status("probe.0")
+            except rp.Misuse as error:
+                os.write(write, str(error).encode())
+            os._exit(0)
+        os.waitpid(pid, 0)
+        self.assertIn(b"was opened before a fork", os.read(read, 1000))
+        self.assertEqual(self.call("count", 1), 1, "the parent's goes on")
+
+    def test_a_closed_client_says_so_and_ends_its_calls(self) -> None:
+        found: list[BaseException] = []
+
+        def call() -> None:
+            try:
+                self.call("wait")
+            except rp.CallError as error:
+                found.append(error)
+
+        thread = threading.Thread(target=call)
+        thread.start()
+        wait(lambda: self.probe.waits)
+        self.client.close()
+        thread.join()
+        self.probe.may_go.set()
+        self.assertEqual(str(found[0]), "this client is closed")
+        with self.assertRaisesRegex(rp.Misuse, "this client is closed"):
+            self.client.status("probe.0")
+
+    def test_what_is_in_the_way_of_a_connection_is_told(self) -> None:
+        free = socket.create_server(("127.0.0.1", 0))
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+        free.close()
+        with self.assertRaisesRegex(rp.NoConnection, f"the TCP router at {address} is not reached"):
+            remote.connect(address, "tool.1", INSTALLATION, timeout_s=1)
+        other = remote.Installation(7, {"tool": 16}, 8, 1)
+        with self.assertRaisesRegex(rp.NoConnection, "the common digest here is 0000000000000008"):
+            remote.connect(self.server.address, "tool.1", other, timeout_s=1)
+        with self.assertRaisesRegex(rp.NoConnection, "there is no .*ca.pem"):
+            remote.connect(self.server.address, "tool.1", INSTALLATION, tls=remote.Tls("nowhere", "x"))
+        with self.assertRaisesRegex(rp.BadName, "no class `motor` is known here; there are: probe, tool"):
+            self.client.proxy("motor.0")
+        with self.assertRaisesRegex(rp.Misuse, "is not of this client's system"):
+            self.client.host("8.96.0.0", Probe())
+        with self.assertRaisesRegex(rp.Misuse, "Probe is hosted already"):
+            self.host.host("probe.1", self.probe)
+
+    def test_parameters_are_set_all_or_none(self) -> None:
+        for values, name in [
+            ([("gain", b"\x03")], "Ok"),
+            ([("gain", b"\x0a")], "Range"),
+            ([("gain", b"")], "Type"),
+            ([("pain", b"\x03")], "Unknown"),
+            ([("gain", b"\x04"), ("gain", b"\x05")], "Twice"),
+            ([("gain", b"\x07")], "Module"),
+        ]:
+            wish = encode(type_of_class(SetParameters), SetParameters(values, False))
+            answer = decode(_SET, self.client.command("probe.0", 10, 4, wish, 20))
+            self.assertEqual(answer.name if answer.name == "Ok" else answer.value.name, name)
+        self.assertEqual(self.probe.gain, 3)
+        with self.assertRaisesRegex(rp.Misuse, "Probe.gain: 10 is not in its range, 1..=9"):
+            self.probe.gain = 10
+
+    def test_asyncio_speaks_over_the_same_core(self) -> None:
+        class Twice(rp.Module, klass="probe"):
+            @rp.command(16)
+            async def twice(self, by: rp.U32) -> rp.U64:
+                counted: int = await self.proxy("probe.0").count(by)
+                return 2 * counted
+
+            @rp.data_out(1, rate_hz=50)
+            async def beat(self) -> int:
+                return 5
+
+        async def main() -> None:
+            server = self.server.address
+            async with await aio.connect(server, "tool.8", INSTALLATION, timeout_s=20, big_endian=True) as client:
+                client.host("probe.2", Twice())
+                counted = await asyncio.gather(*(client.call("probe.0", "count", 1, timeout_s=20) for _ in range(8)))
+                self.assertEqual(sorted(counted), [1, 2, 3, 4, 5, 6, 7, 8])
+                async with await aio.connect(server, "tool.9", INSTALLATION, timeout_s=20) as other:
+                    self.assertEqual(await other.proxy("probe.2", 20).twice(2), 20)
+                    async with other.subscribe("probe.2", "beat") as beats:
+                        self.assertEqual([(await beats.next(20)).value for _ in range(3)], [5, 5, 5])
+                        await asyncio.to_thread(self.server.drop_all)
+                        while other._core.session.connections < 2 or not other.is_up:
+                            await asyncio.sleep(0.01)
+                        self.assertEqual((await beats.next(20)).value, 5)
+                with self.assertRaises(rp.CallTimeout):
+                    await client.status("probe.9", timeout_s=0.2)
+
+                def elsewhere() -> None:
+                    asyncio.run(client.status("probe.0"))
+
+                with self.assertRaisesRegex(rp.Misuse, "belongs to another event loop"):
+                    await asyncio.to_thread(elsewhere)
+            with self.assertRaisesRegex(rp.Misuse, "this client is closed"):
+                await client.status("probe.0")
+
+        asyncio.run(main())
+
+    def test_an_interpreter_ends_with_a_client_open(self) -> None:
+        code = (
+            "from rohrpost import remote\n"
+            "it = remote.Installation(7, {'tool': 16}, 7, 1)\n"
+            f"client = remote.connect('{self.server.address}', 'tool.3', it, timeout_s=20)\n"
+        )
+        said = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True, timeout=60)
+        self.assertEqual((said.returncode, said.stderr), (0, ""))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,234 @@
+//! Programs in Python at a robot: on a laptop in a network namespace of its own, with Python and `clients/python`
+//! alone. The robot is on `base`; its file knows the laptop as a node that the TCP router reaches, and nothing is
+//! launched there.
+
+use crate::conforming;
+use crate::harness::{Place, Robot, signal, wait};
+use crate::process::{Running, Said};
+use nix::sys::signal::Signal;
+use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_testbed::report::skipped;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+const NODES: [(&str, &str); 2] = [("base", "10.80.0.1"), ("laptop", "10.80.0.2")];
+const OPEN: &str = "security = \"none\"";
+const SEALED: &str = "security = \"tls\"\ncertificates = \"certificates\"";
+const SERVER: &str = "10.80.0.1:21119";
+const PAGE: &str = include_str!("../../docs/src/python.md");
+
+struct Scene {
+    // Dropped in this order: processes, what they left, their network.
+    launch: Running,
+    robot: Robot,
+    place: Place,
+    lab: Lab,
+}
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+impl Scene {
+    /// None, with a report, where namespaces are not permitted.
+    fn launched(security: &str) -> Option<Self> {
+        Self::with(security, "")
+    }
+
+    /// The same with more modules.
+    fn with(security: &str, modules: &str) -> Option<Self> {
+        let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
+        let lab = match Lab::new(&NODES.map(spec), 1500) {
+            Ok(lab) => lab,
+            Err(LabError::NotAllowed(error)) => {
+                skipped(&format!("Python on a laptop (network namespaces: {error})"));
+                return None;
+            }
+            Err(error) => panic!("{error}"),
+        };
+        let place = Place::new();
+        let config = place.path("robot.toml");
+        std::fs::write(&config, configured(security) + modules).unwrap();
+        if security == SEALED {
+            place.say(&["keys", "new", config.to_str().unwrap()]).ok();
+        }
+        let command = place.command(&["launch", config.to_str().unwrap(), "--node", "base"]);
+        let mut launch = {
+            let _inside = lab.enter("base").unwrap();
+            Running::start(command)
+        };
+        let robot = place.robot(&config, "base", &mut launch);
+        robot.wait_on(&mut launch);
+        let scene = Self { launch, robot, place, lab };
+        wait("the robot's modules are at the TCP router", || {
+            let net: serde_json::Value = serde_json::from_str(scene.says(&["net", "--json"]).out.trim()).ok()?;
+            (net[0]["beyond"]["state"] == "up").then_some(())
+        });
+        Some(scene)
+    }
+
+    /// Python on the laptop.
+    fn python(&self, arguments: &[&str]) -> Running {
+        let mut command = Command::new("python3");
+        // Beside the sources nothing is to be written.
+        command.arg("-B").args(arguments).current_dir(self.place.path(""));
+        command.env("PYTHONPATH", repository().join("clients/python/src"));
+        command.env("ROHRPOST_DIR", self.place.memory()).env("ROHRPOST_CONFORMING", self.place.path("robot.toml"));
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let _inside = self.lab.enter("laptop").unwrap();
+        Running::start(command)
+    }
+
+    /// A program of the book, with the arguments that the book gives it.
+    fn book(&self, name: &str) -> Running {
+        let fence = format!("```python {name}\n");
+        let code = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no {name}")).split("```").next().unwrap();
+        std::fs::write(self.place.path(name), code).unwrap();
+        self.python(&[name, SERVER, &self.digests(), "certificates"])
+    }
+
+    fn digests(&self) -> String {
+        self.robot.installation.digest().to_string()
+    }
+
+    /// A person's command on the robot.
+    fn says(&self, arguments: &[&str]) -> Said {
+        self.place.say_at(&self.place.path("robot.toml"), "base", arguments)
+    }
+
+    /// `python -m rohrpost` on the laptop, unsealed.
+    fn prints(&self, words: &[&str]) -> Said {
+        let (digests, label) = (self.digests(), "node laptop of robot");
+        let classes = ["motor=200", "odometry=160", "tcp=64", "tool=16"];
+        let mut arguments = [&["-m", "rohrpost"], words].concat();
+        arguments.extend(["--server", SERVER, "--digests", &digests, "--as", "tool.70", "--timeout", "20"]);
+        arguments.extend(["--label", label]);
+        arguments.extend(classes.iter().flat_map(|class| ["--class", class]));
+        self.python(&arguments).said()
+    }
+
+    fn stop(mut self) {
+        drop(self.robot);
+        self.launch.stop();
+        self.place.assert_empty();
+    }
+}
+
+fn configured(security: &str) -> String {
+    let map = repository().join("config/building.map");
+    format!(
+        "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nmotor = {{ id = 200 }}\n\
+         odometry = {{ id = 160 }}\nlaser = {{ id = 150 }}\ngripper = {{ id = 110 }}\nprobe = {{ id = 96 }}\n\
+         tcp = {{ id = 64 }}\noutput = {{ id = 32 }}\ntool = {{ id = 16 }}\n[scheduling]\nreal-time-from = 256\n\
+         [nodes.base]\ntools = [0, 15]\n[nodes.laptop]\nnetwork = \"tcp\"\ntools = [64, 127]\n\
+         [tcp]\n{security}\naddress = \"{}\"\nserver = \"base\"\n\
+         [[module]]\nname = \"motor.0\"\nnode = \"base\"\naliases = [\"odometry.0\", \"laser.0\"]\nbuiltin = \"sim\"\n\
+         settings = {{ map = {map:?}, seed = 1, laser-rate-hz = 10, odometry-rate-hz = 20 }}\n\
+         [[module]]\nname = \"gripper.0\"\nnode = \"laptop\"\nprogram = \"gripper.py\"\n\
+         calls = [\"motor.0\", \"odometry.0\"]\n",
+        NODES[0].1
+    )
+}
+
+#[test]
+fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
+    let Some(scene) = Scene::launched(SEALED) else { return };
+    let mut gripper = scene.book("gripper.py");
+    gripper.wait_for("hosted");
+    let drove = scene.book("drive.py").said().ok();
+    let lines: Vec<&str> = drove.lines().collect();
+    assert!(
+        matches!(lines[..], [at, "refused: NotFinite", time] if at.starts_with("drives at 0.")
+        && time.starts_with("robot's time is known to ")),
+        "{drove}"
+    );
+    let watched = scene.book("watch.py").said().ok();
+    assert_eq!(watched, "motor.0 is On, odometry.0 is On\nnumber 0\n");
+    let closes = || scene.says(&["call", "gripper.0", "close", "4"]);
+    assert_eq!(closes().ok(), "{width_m: 0.02, force_n: 4}\n");
+    let refused = scene.says(&["call", "gripper.0", "close", "40"]);
+    assert_eq!(
+        (refused.code, refused.out.trim()),
+        (Some(1), "gripper.0 answers with an error: \"more than 20 N break it\"")
+    );
+    let said = scene.says(&["call", "gripper.0"]).ok();
+    for words in ["Holds things, and stops the robot while it takes them.", "close <force_n: f64>", "How it holds now."]
+    {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let held = scene.says(&["echo", "gripper.0", "grip", "--count", "1"]).ok();
+    assert!(held.ends_with("{width_m: 0.02, force_n: 4}\n"), "{held}");
+    let config = scene.place.path("robot.toml");
+    let set = |value: &str| {
+        let at = ["--config", config.to_str().unwrap(), "--node", "base"];
+        scene.place.say(&[&["param", "set", "gripper.0", "speed-m-s", value][..], &at].concat())
+    };
+    assert_eq!(set("0.1").ok(), "gripper.0 speed-m-s: 0.05 -> 0.1 m/s\n");
+    assert!(set("0.3").fails().contains("out of range: 0..=0.2"));
+    // The TCP router is killed; the program in Python comes back by itself, the same one.
+    signal(scene.robot.pid("tcp.255"), Signal::SIGKILL);
+    wait("it is called again", || closes().out.contains("width_m").then_some(()));
+    gripper.assert_runs();
+    gripper.signal(Signal::SIGINT);
+    gripper.end();
+    wait("it has gone", || {
+        (scene.says(&["call", "--timeout", "1", "gripper.0", "close", "4"]).code != Some(0)).then_some(())
+    });
+    scene.stop();
+}
+
+#[test]
+fn what_the_tools_print_python_prints_on_the_laptop() {
+    let Some(scene) = Scene::launched(OPEN) else { return };
+    wait("all are in the list, which the TCP router makes anew now and then", || {
+        let hosts = scene.prints(&["list"]).ok();
+        let has = |module| hosts.lines().any(|line| line.starts_with(module) && line.ends_with("node base of robot"));
+        ["motor.0", "odometry.0", "tcp.255"].into_iter().all(has).then_some(())
+    });
+    assert!(scene.prints(&["status", "motor.0"]).ok().starts_with("motor.0 is on\n"));
+    assert_eq!(scene.prints(&["call", "motor.0.drive", "0.3", "-0.1"]).ok(), "ok\n");
+    let refused = scene.prints(&["call", "motor.0.drive", "nan", "0"]);
+    assert_eq!((refused.code, refused.err.trim()), (Some(1), "motor.0.drive answers with an error: NotFinite"));
+    for (words, why) in [
+        (["call", "motor.0.drive", "fast", "0"], "speed_m_s: expected a number (f64), got `fast`"),
+        (["call", "motor.0.fly", "1", "0"], "1.200.0.0 has no function `fly`; it has: drive, halt"),
+        (["call", "pilot.0.drive", "1", "0"], "no class `pilot` is known here"),
+    ] {
+        let said = scene.prints(&words);
+        assert!(said.code == Some(2) && said.err.contains(why), "{said:?}");
+    }
+    let got = scene.prints(&["call", "odometry.0.get.odometry"]).ok();
+    assert!(got.starts_with("{pose: {x_m: "), "{got}");
+    let data = scene.prints(&["echo", "odometry.0.odometry", "--count", "2", "--json"]).ok();
+    let data: Vec<serde_json::Value> = data.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let numbers = data.iter().map(|data| data["sequence"].as_u64());
+    assert_eq!(numbers.collect::<Vec<_>>(), [Some(0), Some(1)], "{data:?}");
+    let time = scene.prints(&["time"]).ok();
+    assert!(time.contains(" s since 1970, off by at most "), "{time}");
+    scene.stop();
+}
+
+#[test]
+fn a_client_in_python_conforms_at_a_tcp_router() {
+    let Some(scene) = Scene::launched(OPEN) else { return };
+    let suite = repository().join("tests/conformance");
+    let (run, client) = (suite.join("run.py"), suite.join("client.py"));
+    let (run, client) = (run.to_str().unwrap(), client.to_str().unwrap());
+    let digests = scene.digests();
+    let said = scene.python(&[run, "--live", SERVER, &digests, "--", "python3", "-B", client]).said().ok();
+    assert!(said.starts_with("conforms: "), "{said}");
+    scene.stop();
+}
+
+#[test]
+fn rust_conforms_at_a_tcp_router_too() {
+    let module = format!("[[module]]\nname = \"probe.0\"\nnode = \"base\"\nprogram = {}\n", conforming::program());
+    let Some(scene) = Scene::with(OPEN, &module) else { return };
+    let (run, me) = (repository().join("tests/conformance/run.py"), std::env::current_exe().unwrap());
+    let client = [me.to_str().unwrap(), "--exact", "conforming::client", "--nocapture"];
+    let digests = scene.digests();
+    let suite = [run.to_str().unwrap(), "--only-live", "--live", SERVER, &digests, "--"];
+    let said = scene.python(&[&suite[..], &client].concat()).said().ok();
+    assert!(said.starts_with("conforms: "), "{said}");
+    scene.stop();
+}
