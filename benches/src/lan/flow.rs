@@ -331,6 +331,20 @@ mod tests {
     }
 
     #[test]
+    fn of_a_message_in_place_both_ends_are_looked_at_and_now_and_then_all_of_it() {
+        let mut damaged = [message(LOOK_EVERY), message(1)];
+        damaged.iter_mut().for_each(|message| message[20] ^= 1);
+        let mut seen = message(0);
+        assert!(look_at(&damaged[0], &mut seen).is_ok() && checked(&seen).is_err(), "all of it");
+        let mut seen = message(0);
+        assert!(look_at(&damaged[1], &mut seen).is_ok());
+        assert_eq!(checked(&seen), Ok(1), "its ends");
+        damaged[1][31] ^= 1;
+        assert!(look_at(&damaged[1], &mut seen).is_ok() && checked(&seen).is_err(), "the end of it");
+        assert!(look_at(&damaged[1][1..], &mut seen).is_err(), "another length");
+    }
+
+    #[test]
     fn figures_of_a_turn() {
         let flown = Flown { sent: 200, received: 101, took_ns: 50_000_000 };
         assert!((flown.rate() - 2_000.0).abs() < 1e-9);
