@@ -276,7 +276,7 @@ pub fn checked(message: &[u8]) -> Result<u64, Failure> {
     let tail = message.len() - NUMBER_BYTES;
     let number = number_at(message, 0);
     let torn = number != number_at(message, tail)
-        || number % LOOK_EVERY == 0 && message[NUMBER_BYTES..tail].iter().any(|byte| *byte != FILLER);
+        || number.is_multiple_of(LOOK_EVERY) && message[NUMBER_BYTES..tail].iter().any(|byte| *byte != FILLER);
     if torn { Err(Failure::Failed(format!("message {number} is damaged"))) } else { Ok(number) }
 }
 

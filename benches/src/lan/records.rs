@@ -41,7 +41,8 @@ pub fn entries(instance: u8, node: &str, to: &[&str], shape: StreamShape) -> Str
     )
 }
 
-/// Makes the stream on the node in the first directory, and waits until that in the second one has its replica.
+/// Makes the stream on the node in the first directory, and waits until that in the second one has its replica. Records
+/// without bytes are written meanwhile, of which some may be on their way still: what reads passes over them.
 ///
 /// # Errors
 /// When that takes too long.
@@ -126,9 +127,11 @@ impl Outlet for RecordOutlet {
         let mut waiting = Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + SILENCE) };
         loop {
             match self.reader.next_timeout(waiting).map_err(stream_failure)? {
-                Next::Record(record) => return look_at(record.body(), message).map(|()| true),
-                // The numbers of those that come say so.
-                Next::Lost(_) => waiting.deadline = Some(Instant::now() + SILENCE),
+                Next::Record(record) if !record.body().is_empty() => {
+                    return look_at(record.body(), message).map(|()| true);
+                }
+                // One of those with which it began, or some are lost: the numbers of those that come say so.
+                Next::Record(_) | Next::Lost(_) => waiting.deadline = Some(Instant::now() + SILENCE),
                 Next::Nothing => return Ok(false),
             }
         }
@@ -161,7 +164,11 @@ impl Link for RecordLink {
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         let waiting = Waiting { spin: Duration::ZERO, deadline: None };
-        let info = came(self.reader.next_timeout_into(&mut self.body, waiting))?;
+        let mut info = came(self.reader.next_timeout_into(&mut self.body, waiting))?;
+        while info.len_bytes == 0 {
+            // One of those with which it began.
+            info = came(self.reader.next_timeout_into(&mut self.body, waiting))?;
+        }
         if info.len_bytes != message.len() {
             return Err(Failure::Failed(format!("{} bytes came, not {}", info.len_bytes, message.len())));
         }

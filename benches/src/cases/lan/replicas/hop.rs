@@ -1,9 +1,8 @@
 //! How long a pose takes from a module on one node to a module on another as a record of a stream, beside a package of
 //! the same routers; every waiting process sleeps.
 
-use super::ethernet;
-use super::ground::LanSegment;
 use crate::cases::Case;
+use crate::cases::lan::ground::{LanSegment, replicating};
 use crate::harness::{Cell, End, Failure, Scheduling, time_two_processes};
 use crate::lan::ends::Module;
 use crate::lan::nodes::index;
@@ -39,7 +38,7 @@ impl Case for ReplicaHop {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = LanSegment::new(settings, &ethernet(SHAPE));
+        let ground = LanSegment::new(settings, &replicating(SHAPE));
         let cell = Cell { scheduling: self.scheduling, ..Cell::hop(BYTES, settings.count(Cell::HOP_MESSAGES)) };
         let contenders = [
             Contender::sampled("rohrpost", || {

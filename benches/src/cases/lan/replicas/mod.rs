@@ -4,18 +4,9 @@ mod hop;
 mod rate;
 mod readers;
 
-use super::ground;
-use super::rates;
 use crate::cases::Case;
-use crate::lan::nodes::{Network, UNPACED};
-use rohrpost_mailbox::StreamShape;
 
 /// All cases of this folder.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     [rate::cases(), hop::cases(), readers::cases()].into_iter().flatten().collect()
-}
-
-/// An Ethernet whose routers do not pace, with these streams.
-fn ethernet(records: StreamShape) -> Network {
-    Network { mtu: ground::ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false, records: Some(records) }
 }

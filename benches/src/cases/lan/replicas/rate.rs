@@ -8,10 +8,9 @@
 //! The writer has a window of records in flight, as a camera has that takes the next picture when one is through:
 //! without one it would write over what has not left. Records are written whole and read in place.
 
-use super::ethernet;
-use super::ground::LanSegment;
-use super::rates::{Losses, SENDER_FIFO, TURN, cbware};
 use crate::cases::Case;
+use crate::cases::lan::ground::{LanSegment, replicating};
+use crate::cases::lan::rates::{Losses, SENDER_FIFO, TURN, cbware};
 use crate::harness::{End, Failure};
 use crate::lan::flow::{Flow, SILENCE, flow};
 use crate::lan::nodes::index;
@@ -55,7 +54,7 @@ impl Case for ReplicaRate {
         // Behind by half of the ring, a replica goes on with the newest.
         let (record_bytes, keep) = (self.bytes as u32, 4 * window as u32);
         let shape = StreamShape { record_bytes, keep, readers: 4, late: Duration::ZERO };
-        let ground = LanSegment::new(settings, &ethernet(shape));
+        let ground = LanSegment::new(settings, &replicating(shape));
         let parts = self.bytes.div_ceil(DATAGRAM_BYTES - HEADS_BYTES);
         let records = if settings.quick { (QUICK_BYTES / self.bytes).min(300) as u64 } else { u64::MAX };
         let ours = Flow {

@@ -1,8 +1,7 @@
 //! What crosses the wire for ten readers of one replica on one node, beside what crosses it for one: each record once.
 
-use super::ethernet;
-use super::ground::LanSegment;
 use crate::cases::Case;
+use crate::cases::lan::ground::{LanSegment, replicating};
 use crate::harness::{Child, End, Failure, Gate, Shared, Zeroable};
 use crate::lan::flow::{FILLER, Inlet, Outlet, checked, put_number};
 use crate::lan::nodes::index;
@@ -41,7 +40,7 @@ impl Case for ReplicaReaders {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = LanSegment::new(settings, &ethernet(SHAPE));
+        let ground = LanSegment::new(settings, &replicating(SHAPE));
         let records = settings.count(RECORDS) as u64;
         let packets = RefCell::new(Vec::new());
         let read_by = |contender, readers| {
