@@ -154,7 +154,7 @@ fn programs_get_the_records_that_check_prints() {
     let installation = parse(include_str!("replica-slots.toml"));
     let left: Vec<f64> = records_left(&installation).into_iter().flatten().collect();
     assert_eq!(left.len(), installation.replicas.len());
-    let page = explain(&installation);
+    let page = explain(&installation, None);
     for (replica, left) in installation.replicas.iter().zip(left) {
         let name = format!("  {} ", replica.text(&installation));
         let line = page.lines().find(|line| line.starts_with(&name) && line.contains("base"));

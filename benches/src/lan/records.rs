@@ -5,7 +5,7 @@
 //! ```
 //! A record is written whole and read in place. Which records come is the routers' matter; what reads them counts.
 
-use super::flow::{Inlet, Outlet, SILENCE, look_at};
+use super::flow::{Inlet, Outlet, look_at};
 use super::router::SYSTEM;
 use crate::harness::{Child, Failure, Link};
 use crate::streams::{came, stamp, stream_failure};
@@ -25,6 +25,10 @@ const NUMBER: u16 = 1;
 /// Routers look for new streams twice a second, and send descriptions once.
 const BEGINS_WITHIN: Duration = Duration::from_secs(20);
 const WRITE_EACH: Duration = Duration::from_millis(5);
+/// After this silence nothing more comes: on a busy computer a record of some thousand datagrams takes a while.
+const SILENCE: Duration = Duration::from_secs(1);
+/// Routers wait as long for lost parts.
+const DEADLINE: &str = "1 s";
 
 fn stream(instance: u8) -> StreamId {
     StreamId { name: Name::new(SYSTEM, RECORDS.0, instance, 0), number: NUMBER }
@@ -37,7 +41,7 @@ pub fn entries(instance: u8, node: &str, to: &[&str], shape: StreamShape) -> Str
     format!(
         "[[module]]\nname = \"records.{instance}\"\nnode = \"{node}\"\nprogram = \"records\"\noptional = true\n\
          [module.stream.{ITEM}]\nrecord = \"{record_bytes} B\"\nkeep = {keep}\nreaders = {readers}\n\
-         [[replica]]\nstream = \"records.{instance}/{ITEM}\"\nto = {to:?}\n"
+         [[replica]]\nstream = \"records.{instance}/{ITEM}\"\nto = {to:?}\ndeadline = \"{DEADLINE}\"\n"
     )
 }
 

@@ -30,7 +30,7 @@ const WINDOW_MAX: usize = 60;
 const DATAGRAM_BYTES: usize = 1_472;
 const HEADS_BYTES: usize = frame::HEAD_BYTES + frame::RECORD_PART_HEAD_BYTES;
 /// Bytes of a quick turn, about.
-const QUICK_BYTES: usize = 8 << 20;
+const QUICK_BYTES: usize = 16 << 20;
 
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let told = [2112, 5860, 15_236, 36_084].map(|bytes| ReplicaRate { bytes, bound: None });
