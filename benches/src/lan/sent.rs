@@ -52,7 +52,7 @@ mod tests {
     #[test]
     fn what_has_left_is_read_of_the_nodes_own_device() {
         let text = "Inter-|   Receive                                                |  Transmit\n \
-                    face |bytes    packets errs drop fifo frame compressed multicast|bytes    packets errs\n    \
+                    name |bytes    packets errs drop fifo frame compressed multicast|bytes    packets errs\n    \
                     lo: 7 1 0 0 0 0 0 0 7 1 0 0 0 0 0 0\n   \
                     lan: 5190 44 0 0 0 0 0 0 1226 15 0 0 0 0 0 0\n";
         let sent = Sent::parse(text).unwrap();

@@ -12,7 +12,7 @@ pub(super) const WHOLE: u16 = u16::MAX;
 /// Of a current Ethernet.
 pub(super) const ETHERNET: u16 = 1_500;
 
-/// An Ethernet whose routers do not pace, on which each node has a replica of the other's stream.
+/// An Ethernet with routers that do not pace. Each node has a replica of the other's stream.
 pub(super) fn replicating(records: StreamShape) -> Network {
     Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false, records: Some(records) }
 }
