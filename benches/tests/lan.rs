@@ -13,7 +13,7 @@ const CBWARE: &str = "CBWare, its table";
 const HOP: &[&str] = &["chain", "chain of mailboxes", "udp"];
 
 /// The cases: a size, and the contenders besides ours.
-const CASES: [(&str, u64, &[&str]); 19] = [
+const CASES: [(&str, u64, &[&str]); 30] = [
     ("hop", 64, HOP),
     ("hop", 1024, HOP),
     ("hop", 16_384, HOP),
@@ -31,6 +31,17 @@ const CASES: [(&str, u64, &[&str]); 19] = [
     ("packing", 64, &["udp"]),
     ("urgent", 64, &["no flood"]),
     ("urgent-saturated", 64, &["no flood"]),
+    ("urgent, replica", 64, &["no flood"]),
+    ("urgent-saturated, replica", 64, &["no flood"]),
+    ("replica, rate", 2112, &["udp", CBWARE]),
+    ("replica, rate", 5860, &["udp", CBWARE]),
+    ("replica, rate", 15_236, &["udp", CBWARE]),
+    ("replica, rate", 36_084, &["udp", CBWARE]),
+    ("replica, rate", 62_000, &["udp"]),
+    ("replica, rate", 4 << 20, &["udp"]),
+    ("replica, hop", 64, &["a package", "udp"]),
+    ("replica, hop, default scheduler", 64, &["a package", "udp"]),
+    ("replica, ten readers", 62_000, &["one reader", "its bytes"]),
     ("junk", 64, &["no junk", "udp, junk on unread ports", "udp"]),
     ("junk of a peer", 64, &["no junk", "udp, junk on unread ports", "udp"]),
 ];

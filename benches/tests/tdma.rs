@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
 
 /// A row of each case that exists whenever the case could run, and its contender.
-const ROWS: [(&str, &str); 18] = [
+const ROWS: [(&str, &str); 21] = [
     ("slots", "loaded"),
     ("slots", "unloaded"),
     ("slots", "ordinary"),
@@ -28,6 +28,9 @@ const ROWS: [(&str, &str); 18] = [
     ("takeover, cycles without Sync", "quiet"),
     ("flows, urgent, p99.9", "measured"),
     ("flows, lost", "all"),
+    ("replicas, records", "beside replicas"),
+    ("replicas, urgent", "beside replicas"),
+    ("replicas, packages lost", "without"),
 ];
 
 /// The case of a row.
@@ -51,7 +54,7 @@ fn every_case_runs_and_every_line_is_complete() {
     let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
     assert_eq!(failed, None);
     // Whatever was declared arrived.
-    let lost = rows.iter().filter(|row| row["case"] == "flows, lost");
+    let lost = rows.iter().filter(|row| row["case"] == "flows, lost" || row["case"] == "replicas, packages lost");
     lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
     assert_eq!(left_behind(&prefix), [""; 0]);
 }

@@ -91,7 +91,7 @@ pub use module::{
 };
 pub use node::{Node, Reach, System};
 pub use output::{Level, LineFormat, Output};
-pub use plan::bounds;
+pub use plan::{bounds, records_left};
 pub use principal::Principal;
 pub use program::{MissingProgram, find_program};
 pub use reader::{is_word as is_class_name, nearest};

@@ -14,6 +14,17 @@ pub fn bounds(installation: &Installation) -> Vec<FlowBound> {
     tdma.and_then(|tdma| Some(plan(installation, tdma)?.bounds(tdma))).unwrap_or_default()
 }
 
+/// Records of full size that slots carry in a second for sure behind all flows, of each replica by its place in
+/// [`Installation::replicas`] and as if it were alone; none if nodes send as packages come.
+pub fn records_left(installation: &Installation) -> Vec<Option<f64>> {
+    let of = |tdma| {
+        let plan = plan(installation, tdma)?;
+        let all = plan.replicas.iter().map(|planned| planned.map(|planned| plan.records_left(tdma, &planned)));
+        Some(all.collect())
+    };
+    installation.tdma.as_ref().and_then(of).unwrap_or_default()
+}
+
 /// Requirements of its nodes and modules on a table.
 pub(crate) fn plan(installation: &Installation, tdma: &Tdma) -> Option<Plan> {
     let (nodes, network) = (installation.lan_nodes(), installation.network?);

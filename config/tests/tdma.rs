@@ -1,6 +1,6 @@
 //! Meaning of a file with time slots for routers.
 
-use rohrpost_config::{Installation, TimeSource, bounds, duration_text, parse_duration};
+use rohrpost_config::{Installation, TimeSource, bounds, duration_text, explain, parse_duration, records_left};
 use rohrpost_network::{TimeSlot, Tunnel};
 use std::net::Ipv4Addr;
 use std::path::Path;
@@ -146,6 +146,20 @@ fn bounds_are_what_the_book_derives() {
 fn without_slots_there_are_no_bounds() {
     let free = include_str!("full.toml");
     assert_eq!(bounds(&parse(free)), []);
+    assert_eq!(records_left(&parse(free)), []);
+}
+
+#[test]
+fn programs_get_the_records_that_check_prints() {
+    let installation = parse(include_str!("replica-slots.toml"));
+    let left: Vec<f64> = records_left(&installation).into_iter().flatten().collect();
+    assert_eq!(left.len(), installation.replicas.len());
+    let page = explain(&installation, None);
+    for (replica, left) in installation.replicas.iter().zip(left) {
+        let name = format!("  {} ", replica.text(&installation));
+        let line = page.lines().find(|line| line.starts_with(&name) && line.contains("base"));
+        assert!(line.is_some_and(|line| line.ends_with(&format!(" {left:.2}"))), "{left} of {line:?}");
+    }
 }
 
 /// Useless tables: each is refused with a message, or has bounds, but nothing overflows or loops forever.

@@ -27,7 +27,8 @@ pub trait Outlet {
 
 /// A message is its number, filler, and its number again.
 const NUMBER_BYTES: usize = 8;
-const FILLER: u8 = 0x5a;
+/// What is between them.
+pub const FILLER: u8 = 0x5a;
 /// Every so many-th message is checked whole, the others at both ends: else checking would take most of the time.
 const LOOK_EVERY: u64 = 61;
 /// The sender looks at the clock after so many messages.
@@ -199,7 +200,8 @@ impl Window {
     }
 }
 
-fn put_number(message: &mut [u8], number: u64) {
+/// Puts its number at both ends of a message.
+pub fn put_number(message: &mut [u8], number: u64) {
     let bytes = number.to_le_bytes();
     message[..NUMBER_BYTES].copy_from_slice(&bytes);
     let tail = message.len() - NUMBER_BYTES;
@@ -237,17 +239,44 @@ fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &FlowTurn) -> Result
     Ok(())
 }
 
+/// Copies what [`flow`] looks at of a message that is read in place: both of its ends, or all of it.
+///
+/// # Errors
+/// When it has another length.
+pub(super) fn look_at(body: &[u8], message: &mut [u8]) -> Result<(), Failure> {
+    if body.len() != message.len() {
+        return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), message.len())));
+    }
+    if number_at(body, 0).is_multiple_of(LOOK_EVERY) {
+        message.copy_from_slice(body);
+    } else {
+        put_ends(body, message);
+    }
+    Ok(())
+}
+
+/// Copies both ends of a message, which are its number.
+pub(super) fn put_ends(from: &[u8], to: &mut [u8]) {
+    let tail = to.len() - NUMBER_BYTES;
+    to[..NUMBER_BYTES].copy_from_slice(&from[..NUMBER_BYTES]);
+    to[tail..].copy_from_slice(&from[tail..]);
+}
+
+fn number_at(message: &[u8], at: usize) -> u64 {
+    let mut bytes = [0; NUMBER_BYTES];
+    bytes.copy_from_slice(&message[at..at + NUMBER_BYTES]);
+    u64::from_le_bytes(bytes)
+}
+
 /// The number of a message, which must be whole.
-fn checked(message: &[u8]) -> Result<u64, Failure> {
-    let number_at = |at: usize| {
-        let mut bytes = [0; NUMBER_BYTES];
-        bytes.copy_from_slice(&message[at..at + NUMBER_BYTES]);
-        u64::from_le_bytes(bytes)
-    };
+///
+/// # Errors
+/// When it is not.
+pub fn checked(message: &[u8]) -> Result<u64, Failure> {
     let tail = message.len() - NUMBER_BYTES;
-    let number = number_at(0);
-    let torn = number != number_at(tail)
-        || number % LOOK_EVERY == 0 && message[NUMBER_BYTES..tail].iter().any(|byte| *byte != FILLER);
+    let number = number_at(message, 0);
+    let torn = number != number_at(message, tail)
+        || number.is_multiple_of(LOOK_EVERY) && message[NUMBER_BYTES..tail].iter().any(|byte| *byte != FILLER);
     if torn { Err(Failure::Failed(format!("message {number} is damaged"))) } else { Ok(number) }
 }
 
@@ -299,6 +328,20 @@ mod tests {
             let error = received(messages).unwrap_err().to_string();
             assert!(error.contains(says), "{error}, not {says}");
         }
+    }
+
+    #[test]
+    fn of_a_message_in_place_both_ends_are_looked_at_and_now_and_then_all_of_it() {
+        let mut damaged = [message(LOOK_EVERY), message(1)];
+        damaged.iter_mut().for_each(|message| message[20] ^= 1);
+        let mut seen = message(0);
+        assert!(look_at(&damaged[0], &mut seen).is_ok() && checked(&seen).is_err(), "all of it");
+        let mut seen = message(0);
+        assert!(look_at(&damaged[1], &mut seen).is_ok());
+        assert_eq!(checked(&seen), Ok(1), "its ends");
+        damaged[1][31] ^= 1;
+        assert!(look_at(&damaged[1], &mut seen).is_ok() && checked(&seen).is_err(), "the end of it");
+        assert!(look_at(&damaged[1][1..], &mut seen).is_err(), "another length");
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! Two nodes with real routers between them, as launch would start them.
 
+use super::records::{self, RECORDS};
 use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all};
 use super::wire::{Wire, address, name_of};
 use crate::Failure;
 use crate::harness::{End, Placement, Scheduling, Scratch, settle};
-use rohrpost_mailbox::{Class, Name};
+use rohrpost_mailbox::{Class, Name, StreamShape};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -25,6 +26,8 @@ pub struct Network {
     pub quota: &'static str,
     /// Whether what passes is sealed.
     pub sealed: bool,
+    /// The stream that each node writes and the other has as a replica; none: there are no streams.
+    pub records: Option<StreamShape>,
 }
 
 /// More than the computer can do, so that it is not in the way.
@@ -61,6 +64,11 @@ impl Nodes {
             nodes.routers.push(router);
         }
         nodes.routers.iter_mut().try_for_each(Router::await_ready)?;
+        if let Some(shape) = network.records {
+            for (from, to) in [(End::Ping, End::Pong), (End::Pong, End::Ping)] {
+                records::begin(&nodes.directory(from), &nodes.directory(to), index(from), shape)?;
+            }
+        }
         Ok(nodes)
     }
 
@@ -88,7 +96,7 @@ fn spec<'a>(end: End, command: &'a Path, config: &'a Path, scratch: &'a Path) ->
 }
 
 /// Of the node in the configuration, and so of its router.
-fn index(end: End) -> u8 {
+pub fn index(end: End) -> u8 {
     u8::from(end == End::Pong)
 }
 
@@ -104,7 +112,7 @@ pub fn flood(end: End, turn: u8) -> Name {
 }
 
 fn configuration(network: &Network) -> String {
-    let Network { mtu, rate, quota, sealed } = network;
+    let Network { mtu, rate, quota, sealed, records } = network;
     let security = if *sealed { "keys" } else { "none" };
     let [near, far] = [End::Ping, End::Pong].map(address);
     let modules = [("bench", End::Ping), ("bench", End::Pong), ("flood", End::Ping), ("flood", End::Pong)];
@@ -115,6 +123,10 @@ fn configuration(network: &Network) -> String {
             "[[module]]\nname = \"{class}.{instance}\"\nnode = \"{node}\"\nprogram = \"{class}\"\noptional = true\n"
         )
     });
+    let replica =
+        |shape: StreamShape, from: End, to: End| records::entries(index(from), name_of(from), &[name_of(to)], shape);
+    let replicas =
+        records.map(|shape| [replica(shape, End::Ping, End::Pong), replica(shape, End::Pong, End::Ping)].concat());
     format!(
         r#"installation = "{INSTALLATION}"
 [system]
@@ -124,6 +136,7 @@ id = {SYSTEM}
 router = {{ id = {router}, text = "Carries packages between nodes" }}
 bench = {{ id = {bench}, text = "Is timed" }}
 flood = {{ id = {flood}, text = "Floods" }}
+records = {{ id = {records}, text = "Writes records" }}
 tool = {{ id = 16, text = "Tools" }}
 [nodes.near]
 address = "{near}"
@@ -138,10 +151,12 @@ rate = "{rate}"
 quota = "{quota}"
 [time]
 source = "master"
-{modules}"#,
+{modules}{replicas}"#,
         router = ROUTER.0,
         bench = BENCH.0,
         flood = FLOOD.0,
+        records = RECORDS.0,
         modules = modules.concat(),
+        replicas = replicas.unwrap_or_default(),
     )
 }

@@ -1,6 +1,6 @@
 //! Datagrams from socket to socket, as the kernel carries them: one system call to send, one to receive.
 
-use super::flow::{Inlet, Outlet};
+use super::flow::{FILLER, Inlet, Outlet, look_at, put_ends};
 use super::wire::{Wire, address};
 use crate::harness::{End, Failure, Link};
 use nix::sys::socket::{setsockopt, sockopt};
@@ -97,5 +97,45 @@ impl Inlet for Datagrams {
 impl Outlet for Datagrams {
     fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
         self.take(message)
+    }
+}
+
+/// The same out of memory as large as a record, and into such memory, one datagram behind the other: as parts of a
+/// record go.
+pub struct RawParts {
+    datagrams: Datagrams,
+    record: Vec<u8>,
+    at: usize,
+}
+
+impl RawParts {
+    /// Of datagrams like these.
+    pub fn new(datagrams: Datagrams, record_bytes: usize) -> Self {
+        Self { datagrams, record: vec![FILLER; record_bytes], at: 0 }
+    }
+
+    /// Where the next datagram lies.
+    fn next(&mut self, bytes: usize) -> (&Datagrams, &mut [u8]) {
+        let begin = if self.at + bytes > self.record.len() { 0 } else { self.at };
+        self.at = begin + bytes;
+        (&self.datagrams, &mut self.record[begin..begin + bytes])
+    }
+}
+
+impl Inlet for RawParts {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        let (datagrams, part) = self.next(message.len());
+        put_ends(message, part);
+        datagrams.0.send(part).map(drop).map_err(|error| Failure::of("send", error))
+    }
+}
+
+impl Outlet for RawParts {
+    fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
+        let (datagrams, part) = self.next(message.len());
+        if !datagrams.take(part)? {
+            return Ok(false);
+        }
+        look_at(part, message).map(|()| true)
     }
 }

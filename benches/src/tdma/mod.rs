@@ -16,6 +16,7 @@ pub mod counts;
 pub mod filter;
 pub mod kept;
 pub mod plan;
+pub mod records;
 pub mod rights;
 pub mod routers;
 pub mod shells;

@@ -2,9 +2,10 @@
 
 use super::stage::{NODES, Place};
 use crate::Failure;
+use crate::lan::records::{self, RECORDS};
 use crate::lan::router::{ROUTER, SYSTEM};
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Class, Name};
+use rohrpost_mailbox::{Class, Name, StreamShape};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::tdma::SlotTable;
 use std::path::Path;
@@ -35,6 +36,13 @@ pub struct Plan {
     pub masters: u8,
     /// What each node has declared to send.
     pub flows: &'static [Declared],
+    /// The stream that each node writes and the next one has as a replica; none: there are no streams.
+    pub records: Option<StreamShape>,
+}
+
+/// The node that has the replica of a node's stream.
+pub fn replica_of(node: u8) -> u8 {
+    (node + 1) % NODES
 }
 
 /// A flow that each node has to another.
@@ -130,6 +138,7 @@ id = {SYSTEM}
 router = {{ id = {router}, text = "Carries packages between nodes" }}
 ear = {{ id = {ear}, text = "Takes declared flows" }}
 flood = {{ id = {flood}, text = "Always has packages for others" }}
+records = {{ id = {records}, text = "Writes records" }}
 tool = {{ id = 16, text = "Tools" }}
 {classes}[network]
 security = "none"
@@ -148,6 +157,7 @@ masters = [{masters}]
             router = ROUTER.0,
             ear = EAR.0,
             flood = FLOOD.0,
+            records = RECORDS.0,
             masters = masters.join(", "),
             nodes = nodes.collect::<String>(),
             modules = self.modules(),
@@ -173,6 +183,10 @@ masters = [{masters}]
                     "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = \"{bytes} B\"\n\
                      period = \"{period_us} us\"\n"
                 );
+            }
+            if let Some(shape) = self.records {
+                let to = Place::Node(replica_of(node)).name();
+                text += &records::entries(node, &Place::Node(node).name(), &[&to], shape);
             }
         }
         text

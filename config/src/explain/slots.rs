@@ -118,12 +118,12 @@ impl Page<'_> {
         let columns = "of node   left in 1 s    record  to   at least  records in 1 s";
         self.line(format!("  {:width$}  {columns}", "replica", width = width.max(7)));
         for ((planned, _), name) in all.into_iter().zip(names) {
-            let (left, parts) = (plan.parts_left(tdma, planned.node), planned.parts(&plan.link));
+            let left = plan.parts_left(tdma, planned.node);
             let bytes = size_about(left / 1000 * plan.link.part_bytes() as u64);
             let record = size_text(planned.record_bytes.into());
             let least = long(plan.record_least(tdma, &planned));
             let (node, receivers) = (self.node_name(planned.node), planned.receivers);
-            let many = left as f64 / (1000 * parts) as f64;
+            let many = plan.records_left(tdma, &planned);
             self.line(format!(
                 "  {name:width$}  {node:8}  {bytes:>11}  {record:>8}  {receivers:>2}  {least:>9}  {many:>14.2}",
                 width = width.max(7)

@@ -15,7 +15,7 @@ use super::rx_thread::{RxSystem, RxThread};
 use super::sending::{NoPackages, Sending};
 use super::slots::SlotParts;
 use super::socket::{InSocket, REPLICA_BYTES};
-use super::threads::{Awake, Shared, schedule_below};
+use super::threads::{Shared, schedule_below};
 use super::wire::PeerSockets;
 use super::{Shell, ShellError};
 use crate::counts::Cause;
@@ -105,7 +105,7 @@ struct ReplicaTx {
 impl ReplicaTx {
     /// Runs until the router ends.
     fn run(mut self) {
-        let (mut awake, mut look_ns) = (Awake::default(), 0);
+        let mut look_ns = 0;
         while !self.shared.ends() {
             let now_ns = monotonic_ns();
             if now_ns >= look_ns {
@@ -115,20 +115,20 @@ impl ReplicaTx {
             match self.driver.poll(&mut self.sending, |ns| self.clock.at(ns), &mut self.sender) {
                 ReplicaWait::Again => {}
                 ReplicaWait::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
-                ReplicaWait::Wait { for_ns } => awake.slept(self.wait(Duration::from_nanos(for_ns))),
+                ReplicaWait::Wait { for_ns } => self.wait(Duration::from_nanos(for_ns)),
             }
-            awake.pause_if_long(now_ns);
         }
     }
 
-    /// Sleeps until there is a record or a request; for how long it slept.
-    fn wait(&mut self, time: Duration) -> Duration {
+    /// Sleeps until there is a record or a request.
+    fn wait(&mut self, time: Duration) {
         let (mut readers, has_requests) = self.sender.waits_on();
         let has_more = || self.shared.ends() || has_requests();
         if readers.is_empty() {
-            return self.participant.wait(time, has_more);
+            self.participant.wait(time, has_more);
+        } else {
+            wait_any(&mut readers, time, has_more);
         }
-        wait_any(&mut readers, time, has_more)
     }
 }
 

@@ -98,7 +98,10 @@ impl<D: Deliver> RxThread<D> {
                 ring_ns = now_ns + RING_EVERY_NS;
                 system.shared.ring_if_due(now_ns);
             }
-            awake.pause_if_long(now_ns);
+            // What is not real time shares its processor as the kernel has it.
+            if !driver.is_rest() {
+                awake.pause_if_long(now_ns);
+            }
         }
     }
 }

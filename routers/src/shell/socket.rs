@@ -243,8 +243,13 @@ impl OutSocket {
             Some(socket) => socket,
             none => none.insert(connect(self.own, self.peer, self.waiting_bytes).map_err(|error| Failure::of(&error))?),
         };
+        // Without a list of pieces the kernel has less to copy.
+        let send = |socket: &Socket| match parts {
+            [whole] => socket.send(whole),
+            parts => socket.send_vectored(parts),
+        };
         let sent = loop {
-            match socket.send_vectored(parts) {
+            match send(socket) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 sent => break sent,
             }
@@ -254,7 +259,7 @@ impl OutSocket {
         match failure {
             // The error of an earlier datagram. This one was not sent: it is sent again, now without the error.
             Failure::NobodyThere => {
-                let again = socket.send_vectored(parts);
+                let again = send(socket);
                 again.map(drop).map_err(|error| Failure::of(&error)).and(Err(Failure::NobodyThere))
             }
             Failure::NoWay => {

@@ -2,14 +2,20 @@
 
 use crate::harness::Failure;
 use crate::lan::Wire;
-use crate::lan::nodes::{Network, Nodes};
+use crate::lan::nodes::{Network, Nodes, UNPACED};
 use crate::settings::Settings;
+use rohrpost_mailbox::StreamShape;
 use std::cell::Cell as Counter;
 
 /// The largest possible datagram, so that nothing is fragmented.
 pub(super) const WHOLE: u16 = u16::MAX;
 /// Of a current Ethernet.
 pub(super) const ETHERNET: u16 = 1_500;
+
+/// An Ethernet with routers that do not pace. Each node has a replica of the other's stream.
+pub(super) fn replicating(records: StreamShape) -> Network {
+    Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false, records: Some(records) }
+}
 
 /// What all turns of a case share.
 pub(super) struct LanSegment {

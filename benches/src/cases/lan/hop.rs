@@ -41,8 +41,10 @@ impl Case for LanHop {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground =
-            LanSegment::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB", sealed: false });
+        let ground = LanSegment::new(
+            settings,
+            &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB", sealed: false, records: None },
+        );
         let messages = settings.count(if self.pace.is_some() { MESSAGES_PACED } else { Cell::HOP_MESSAGES });
         let cell = Cell { pace: self.pace, ..Cell::hop(self.bytes, messages) };
         let contenders = [

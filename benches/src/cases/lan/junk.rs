@@ -58,7 +58,7 @@ impl Case for LanJunk {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false };
+        let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false, records: None };
         let ground = LanSegment::on(settings, &network, Wire::with_stranger(network.mtu));
         let cell = Cell { pace: Some(PACE), ..Cell::hop(BYTES, settings.count(MESSAGES)) };
         let rates = RefCell::new(Vec::new());

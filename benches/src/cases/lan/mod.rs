@@ -6,6 +6,7 @@ mod ground;
 mod hop;
 mod junk;
 mod rates;
+mod replicas;
 mod sealed;
 mod urgent;
 
@@ -13,8 +14,14 @@ use super::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [hop::cases(), sealed::cases(), rates::cases(), urgent::cases(), junk::cases(), clock::cases()]
-        .into_iter()
-        .flatten()
-        .collect()
+    let all = [
+        hop::cases(),
+        sealed::cases(),
+        rates::cases(),
+        urgent::cases(),
+        replicas::cases(),
+        junk::cases(),
+        clock::cases(),
+    ];
+    all.into_iter().flatten().collect()
 }

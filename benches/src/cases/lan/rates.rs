@@ -28,11 +28,11 @@ use std::cell::RefCell;
 use std::time::Duration;
 
 /// Long enough for some ten thousand packages, short enough that the kernel's fair server stays out.
-const TURN: Duration = Duration::from_millis(500);
+pub(super) const TURN: Duration = Duration::from_millis(500);
 /// Less than the slots of a router's mailbox.
 const WINDOW: u64 = 60;
 /// Above the routers' threads: a sender on the other processor hands over its whole window before they run.
-const SENDER_FIFO: u8 = 80;
+pub(super) const SENDER_FIFO: u8 = 80;
 const BESIDE_ROUTER: &str = "beside its router";
 /// Headers of IPv4, UDP and a router's frame, before the packages.
 const BEFORE_PACKAGES: usize = 28 + frame::HEAD_BYTES;
@@ -66,7 +66,8 @@ impl Case for Rate {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
         let mtu = if self.packs { WHOLE } else { u16::try_from(one).unwrap_or(WHOLE) };
-        let ground = LanSegment::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB", sealed: false });
+        let ground =
+            LanSegment::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB", sealed: false, records: None });
         let losses = Losses::default();
         let raw = Flow {
             bytes: self.bytes,
@@ -95,9 +96,7 @@ impl Case for Rate {
                 flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(SILENCE))
             }),
         ];
-        if let Some((_, rate)) = CBWARE.into_iter().find(|(bytes, _)| *bytes == self.bytes) {
-            contenders.push(Contender { name: CBWARE_NAME, turn: Box::new(move || Ok(Summary::single(rate))) });
-        }
+        contenders.extend(cbware(self.bytes));
         let versus: Vec<Versus> = contenders[2..]
             .iter()
             .map(|other| Versus {
@@ -113,7 +112,11 @@ impl Case for Rate {
     }
 }
 
-const CBWARE_NAME: &str = "CBWare, its table";
+/// What CBWare reached with messages of this size, if its table says so.
+pub(super) fn cbware(bytes: usize) -> Option<Contender<'static>> {
+    let (_, rate) = CBWARE.into_iter().find(|(its, _)| *its == bytes)?;
+    Some(Contender { name: "CBWare, its table", turn: Box::new(move || Ok(Summary::single(rate))) })
+}
 
 fn messages(settings: &Settings) -> u64 {
     if settings.quick { settings.count(usize::MAX) as u64 } else { u64::MAX }
@@ -121,20 +124,34 @@ fn messages(settings: &Settings) -> u64 {
 
 /// Loss of each contender in each turn, percent.
 #[derive(Default)]
-struct Losses(RefCell<Vec<(&'static str, f64)>>);
+pub(super) struct Losses(RefCell<Vec<(&'static str, f64)>>);
 
 impl Losses {
-    fn rated<'a>(&'a self, name: &'static str, turn: impl Fn() -> Result<Flown, Failure> + 'a) -> Contender<'a> {
+    pub(super) fn rated<'a>(
+        &'a self,
+        name: &'static str,
+        turn: impl Fn() -> Result<Flown, Failure> + 'a,
+    ) -> Contender<'a> {
+        self.rated_in(name, 1, turn)
+    }
+
+    /// The same, where so many messages are one that is counted.
+    pub(super) fn rated_in<'a>(
+        &'a self,
+        name: &'static str,
+        messages: usize,
+        turn: impl Fn() -> Result<Flown, Failure> + 'a,
+    ) -> Contender<'a> {
         let turn = move || {
             let flown = turn()?;
             self.0.borrow_mut().push((name, flown.lost_percent()));
-            Ok(Summary::single(flown.rate()))
+            Ok(Summary::single(flown.rate() / messages as f64))
         };
         Contender { name, turn: Box::new(turn) }
     }
 
     /// One for each contender that had a turn: the median over rounds, and the worst.
-    fn rows(&self, subject: &Subject) -> Vec<Row> {
+    pub(super) fn rows(&self, subject: &Subject) -> Vec<Row> {
         let losses = self.0.borrow();
         let of = |contender| losses.iter().filter(move |(name, _)| *name == contender).map(|(_, percent)| *percent);
         let row = |contender| {

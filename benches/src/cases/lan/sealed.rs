@@ -23,7 +23,7 @@ impl Case for Sealed {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false };
+        let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false, records: None };
         let [sealed, open] = [true, false].map(|sealed| LanSegment::new(settings, &Network { sealed, ..network }));
         let cell = Cell::hop(self.bytes, settings.count(Cell::HOP_MESSAGES));
         let time = |ground: &LanSegment| {

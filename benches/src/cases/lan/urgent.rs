@@ -16,6 +16,9 @@
 //! not use. The flooder pauses for 2 ms in 20, so that the kernel's fair server stays out; the queue outlasts the
 //! pause.
 //!
+//! `urgent, replica`, `urgent-saturated, replica`: the same past a flood of a stream's records, twice as many as the
+//! routers may send, to a node that has it as a replica. The flooder sleeps until the next is due.
+//!
 //! The floor, `udp`: sockets in the modules themselves, with a separate socket pair for the flood, at the rate of the
 //! routers.
 
@@ -28,11 +31,12 @@ use crate::lan::Wire;
 use crate::lan::ends::{LanSink, LanSource, Module};
 use crate::lan::flow::{Inlet, Outlet};
 use crate::lan::nodes::{self, Network, Nodes};
+use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::udp::Datagrams;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
-use rohrpost_mailbox::sys;
+use rohrpost_mailbox::{StreamShape, sys};
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -50,9 +54,13 @@ const CAP: Duration = Duration::from_secs(3);
 /// Timeout of an urgent package; a later one counts as lost.
 const LOST_AFTER: Duration = Duration::from_secs(1);
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
-const CARRIED: Network = Network { mtu: 1_500, rate: "10 MiB", quota: "256 KiB", sealed: false };
+const CARRIED: Network = Network { mtu: 1_500, rate: "10 MiB", quota: "256 KiB", sealed: false, records: None };
 /// The default of users.
 const USUAL: Network = Network { rate: "100 MiB", ..CARRIED };
+/// Records that flood.
+const RECORD_BYTES: usize = 62_000;
+const RECORDS: StreamShape =
+    StreamShape { record_bytes: RECORD_BYTES as u32, keep: 8, readers: 4, late: Duration::ZERO };
 /// Port of the bare flood.
 const FLOOD_PORT: u16 = 20_217;
 /// The bare swamp checks this often whether the turn is over.
@@ -62,8 +70,16 @@ const WIRE_BYTES: u64 = 66;
 
 /// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let urgent = |name, network, mib_s: u64| Box::new(Urgent { name, network, bytes_s: mib_s << 20 }) as Box<dyn Case>;
-    vec![urgent("urgent", CARRIED, 10), urgent("urgent-saturated", USUAL, 100)]
+    let urgent = |name, network: Network, mib_s: u64, records| {
+        let network = Network { records, ..network };
+        Box::new(Urgent { name, network, bytes_s: mib_s << 20 }) as Box<dyn Case>
+    };
+    vec![
+        urgent("urgent", CARRIED, 10, None),
+        urgent("urgent-saturated", USUAL, 100, None),
+        urgent("urgent, replica", CARRIED, 10, Some(RECORDS)),
+        urgent("urgent-saturated, replica", USUAL, 100, Some(RECORDS)),
+    ]
 }
 
 struct Urgent {
@@ -101,7 +117,10 @@ impl Case for Urgent {
         let contenders = [
             Contender::sampled("rohrpost", || {
                 let (nodes, turn) = ground.turn()?;
-                let flood = Flooder::over(nodes, turn)?;
+                let flood = match self.network.records {
+                    None => Flooder::over(nodes, turn)?,
+                    Some(shape) => Flooder::of_records(nodes, shape, self.bytes_s)?,
+                };
                 beside(flood, &floods[0], urgent(nodes, turn, &cell))
             }),
             Contender::sampled("no flood", || {
@@ -111,14 +130,20 @@ impl Case for Urgent {
             Contender::sampled("udp", || beside(Flooder::bare(ground.wire()?, self.bytes_s)?, &floods[1], udp())),
             Contender::sampled("udp, no flood", udp),
         ];
+        let p99 = if self.network.records.is_some() { 2.0 } else { 3.0 };
         let versus = [
-            Versus { name: "no flood", p50: Some(Target::AtMost(1.5)), p99: Some(Target::AtMost(3.0)) },
+            Versus { name: "no flood", p50: Some(Target::AtMost(1.5)), p99: Some(Target::AtMost(p99)) },
             Versus { name: "udp", p50: None, p99: None },
         ];
         let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
         let mut rows = compare(settings, &subject, &contenders, &versus);
-        rows.extend(flood_rows(&self.name(), ["flood, taken", "flood, arrived"], &floods[0].borrow()));
-        rows.extend(flood_rows(&self.name(), ["flood by udp, sent", "flood by udp, arrived"], &floods[1].borrow()));
+        let what = match self.network.records {
+            None => ("packages/s", FLOOD_BYTES),
+            Some(_) => ("records/s", RECORD_BYTES),
+        };
+        rows.extend(flood_rows(&self.name(), what, ["flood, taken", "flood, arrived"], &floods[0].borrow()));
+        let (what, udp) = (("packages/s", FLOOD_BYTES), ["flood by udp, sent", "flood by udp, arrived"]);
+        rows.extend(flood_rows(&self.name(), what, udp, &floods[1].borrow()));
         Ok(rows)
     }
 }
@@ -132,7 +157,7 @@ fn urgent(nodes: &Nodes, turn: u8, cell: &Cell) -> Result<Vec<f64>, Failure> {
     })
 }
 
-/// Packages a second that the flooder sent, and that arrived.
+/// Packages or records a second that the flooder sent, and that arrived.
 #[derive(Clone, Copy)]
 struct Flooded {
     sent: f64,
@@ -169,7 +194,23 @@ impl Flooder {
             let mut source = LanSource::open(&nodes.directory(End::Ping), from, to)?;
             Ok(move |message: &[u8]| source.offer(message))
         };
-        Self::start(sink, source)
+        Self::start(FLOOD_BYTES, sink, source)
+    }
+
+    /// Of records of the near node's stream to a reader of its replica, twice as many as so many bytes a second are.
+    fn of_records(nodes: &Nodes, shape: StreamShape, bytes_s: u64) -> Result<Self, Failure> {
+        let origin = nodes::index(End::Ping);
+        let each = Duration::from_secs_f64(RECORD_BYTES as f64 / (2 * bytes_s) as f64);
+        let source = || {
+            let mut inlet = RecordInlet::open(&nodes.directory(End::Ping), origin, shape)?;
+            let mut due = Instant::now();
+            Ok(move |message: &[u8]| {
+                std::thread::sleep(due.saturating_duration_since(Instant::now()));
+                due = (due + each).max(Instant::now());
+                inlet.send(message).map(|()| true)
+            })
+        };
+        Self::start(RECORD_BYTES, || RecordOutlet::open(&nodes.directory(End::Pong), origin), source)
     }
 
     /// From socket to socket, at most at this rate.
@@ -190,11 +231,12 @@ impl Flooder {
                 Ok(may)
             })
         };
-        Self::start(|| open(End::Pong)?.with_patience(LOOK), source)
+        Self::start(FLOOD_BYTES, || open(End::Pong)?.with_patience(LOOK), source)
     }
 
     /// `sink` opens the receiving side. `source` opens the sending side and reports whether each package was accepted.
     fn start<O: Outlet, S: FnMut(&[u8]) -> Result<bool, Failure>>(
+        bytes: usize,
         sink: impl FnOnce() -> Result<O, Failure>,
         source: impl FnOnce() -> Result<S, Failure>,
     ) -> Result<Self, Failure> {
@@ -203,7 +245,7 @@ impl Flooder {
             let mut sink = sink()?;
             settle_low(End::Ping)?;
             counts.swamp.meet(2)?;
-            let mut message = vec![0; FLOOD_BYTES];
+            let mut message = vec![0; bytes];
             while counts.over.load(Ordering::Acquire) == 0 {
                 if sink.receive(&mut message)? {
                     counts.received.fetch_add(1, Ordering::AcqRel);
@@ -216,7 +258,7 @@ impl Flooder {
             let mut offer = source()?;
             settle_low(End::Pong)?;
             counts.flooding.meet(2)?;
-            let message = vec![7; FLOOD_BYTES];
+            let message = vec![7; bytes];
             let is_over = || counts.over.load(Ordering::Acquire) != 0;
             while !is_over() {
                 let ends = Instant::now() + FLOOD;
@@ -256,11 +298,17 @@ fn settle_low(end: End) -> Result<(), Failure> {
     Ok(())
 }
 
-fn flood_rows(case: &str, [sent, arrived]: [&'static str; 2], floods: &[Flooded]) -> Vec<Row> {
-    // What the router's mailbox took, and what arrived.
+/// `unit` and `bytes` of what floods.
+fn flood_rows(
+    case: &str,
+    (unit, bytes): (&'static str, usize),
+    [sent, arrived]: [&'static str; 2],
+    floods: &[Flooded],
+) -> Vec<Row> {
+    // What the router's mailbox, or the stream, took, and what arrived.
     let row = |contender, rate: fn(&Flooded) -> f64| {
         let median = crate::statistics::median(floods.iter().map(rate))?;
-        let subject = Subject { case: case.into(), bytes: Some(FLOOD_BYTES), unit: "packages/s" };
+        let subject = Subject { case: case.into(), bytes: Some(bytes), unit };
         Some(Row::alone(subject, contender, Ok(Summary::single(median))))
     };
     [row(sent, |flood| flood.sent), row(arrived, |flood| flood.received)].into_iter().flatten().collect()

@@ -13,7 +13,7 @@ use crate::statistics::{Summary, median};
 use crate::tdma::bare::BareThreads;
 use crate::tdma::capture::{Arrived, Capture};
 use crate::tdma::counts::Counts;
-use crate::tdma::plan::Declared;
+use crate::tdma::plan::{Declared, Plan};
 use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
 use crate::tdma::stage::Stage;
@@ -23,8 +23,8 @@ use std::time::{Duration, Instant};
 
 /// Parts of a turn, each checked for time that the hypervisor took.
 const WINDOW: Duration = Duration::from_secs(1);
-const WITHIN: [Goal; 1] = [Goal { name: "must bound", most: 1.0 }];
-const WITHIN_ALONE: [Goal; 1] = [Goal { name: "hoped bound", most: 1.0 }];
+pub(super) const WITHIN: [Goal; 1] = [Goal { name: "must bound", most: 1.0 }];
+pub(super) const WITHIN_ALONE: [Goal; 1] = [Goal { name: "hoped bound", most: 1.0 }];
 const NOT_VACUOUS: [Goal; 1] = [Goal { name: "must 3 times", most: 3.0 }];
 const STOLEN: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
 
@@ -93,14 +93,15 @@ fn steal_in_windows(all: Duration) -> Result<Vec<f64>, Failure> {
 }
 
 /// A flow of each node. Their bounds are the same, since their slots are.
-struct Measured {
-    name: &'static str,
-    bound_us: f64,
-    latencies_us: Vec<f64>,
+pub(super) struct Measured {
+    pub(super) name: &'static str,
+    pub(super) bound_us: f64,
+    pub(super) latencies_us: Vec<f64>,
 }
 
-fn measured(turns: &[FlowTurns]) -> Result<Vec<Measured>, Failure> {
-    let installation = FLOWS.installation()?;
+/// Each flow of a plan, and what came of it.
+pub(super) fn measured(plan: &Plan, arrivals: &[&[Arrived]]) -> Result<Vec<Measured>, Failure> {
+    let installation = plan.installation()?;
     let bounds = rohrpost_config::bounds(&installation);
     let of = |Declared { class: (class, name), .. }: &Declared| {
         let own = bounds.iter().filter(|bound| installation.flows[bound.flow].from.class() == *class);
@@ -109,18 +110,19 @@ fn measured(turns: &[FlowTurns]) -> Result<Vec<Measured>, Failure> {
             let latency = bound.latency.map_err(|why| Failure::of(name, why))?.latency;
             bound_us = bound_us.max(latency.as_nanos() as f64 / 1000.0);
         }
-        let came = turns.iter().flat_map(|turn| &turn.arrivals).filter(|came| came.class == class.0);
+        let came = arrivals.iter().copied().flatten().filter(|came| came.class == class.0);
         let latencies_us = came.map(|came| came.at_ns.saturating_sub(came.published_ns) as f64 / 1000.0).collect();
         Ok(Measured { name, bound_us, latencies_us })
     };
-    FLOWS.flows.iter().map(of).collect()
+    plan.flows.iter().map(of).collect()
 }
 
 fn rows(turns: &[FlowTurns]) -> Result<Vec<Row>, Failure> {
     let mut late_us: Vec<f64> = turns.iter().flat_map(|turn| turn.bare.late_us.iter().copied()).collect();
     let wake_up_us = Summary::of(&mut late_us).and_then(|summary| summary.p999).unwrap_or_default();
     let mut rows = Vec::new();
-    for Measured { name, bound_us, mut latencies_us } in measured(turns)? {
+    let arrivals: Vec<&[Arrived]> = turns.iter().map(|turn| turn.arrivals.as_slice()).collect();
+    for Measured { name, bound_us, mut latencies_us } in measured(&FLOWS, &arrivals)? {
         let case = format!("flows, {name}");
         let Some(p999_us) = Summary::of(&mut latencies_us).and_then(|summary| summary.p999) else {
             let failure = Failure::Failed("nothing of it came".into());

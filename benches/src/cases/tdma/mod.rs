@@ -1,4 +1,5 @@
-//! Time slots: how well they are kept, how well time is, what happens when the master dies, and whether bounds hold.
+//! Time slots: how well they are kept, how well time is, what happens when the master dies, and whether bounds hold,
+//! also beside replicas.
 
 mod brisk;
 mod clock;
@@ -9,6 +10,7 @@ mod junk;
 mod observed;
 mod pitch;
 pub mod plans;
+mod replicas;
 mod slots;
 mod takeover;
 
@@ -16,8 +18,15 @@ use super::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [slots::cases(), brisk::cases(), pitch::cases(), clock::cases(), takeover::cases(), flows::cases(), junk::cases()]
-        .into_iter()
-        .flatten()
-        .collect()
+    let all = [
+        slots::cases(),
+        brisk::cases(),
+        pitch::cases(),
+        clock::cases(),
+        takeover::cases(),
+        flows::cases(),
+        replicas::cases(),
+        junk::cases(),
+    ];
+    all.into_iter().flatten().collect()
 }

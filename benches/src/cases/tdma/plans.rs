@@ -1,7 +1,8 @@
 //! The slot tables of the cases.
 
 use crate::tdma::plan::{Declared, Plan};
-use rohrpost_mailbox::Class;
+use rohrpost_mailbox::{Class, StreamShape};
+use std::time::Duration;
 
 /// RTnet's own cycle; slots with room for a datagram of 1400 B on an ordinary link.
 pub const LOADED: Plan = Plan {
@@ -12,6 +13,7 @@ pub const LOADED: Plan = Plan {
     link: "100 Mbit/s",
     masters: 2,
     flows: &[],
+    records: None,
 };
 
 /// The shortest slots for such a datagram with a guard of 150 µs: 50 µs late, six frames of routers and a datagram, 20
@@ -29,6 +31,12 @@ pub const BRISK: Plan = Plan { cycle_us: 1_000, synchronisation_us: 210, masters
 
 /// Slots with room for several packages: declared flows fit, and flooding modules share the rest.
 pub const FLOWS: Plan = Plan { pitch_us: 1_300, flows: &[URGENT, STEADY, BULKY], ..LOADED };
+
+/// The same with a stream on each node that the next one has as a replica.
+pub const REPLICAS: Plan = Plan { records: Some(RECORDS), ..FLOWS };
+
+/// In twelve parts. A replica that is behind by half of them goes on with the newest.
+const RECORDS: StreamShape = StreamShape { record_bytes: 16 << 10, keep: 16, readers: 4, late: Duration::ZERO };
 
 const URGENT: Declared = Declared { class: (Class(200), "urgent"), hop: 1, bytes: 64, period_us: 9_000 };
 const STEADY: Declared = Declared { class: (Class(160), "steady"), hop: 2, bytes: 1_000, period_us: 19_000 };

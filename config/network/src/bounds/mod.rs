@@ -123,6 +123,11 @@ impl Plan {
         supply(tdma, &self.link, node).leaves(&streams, self.link.largest_ns())
     }
 
+    /// Records of full size that the slots carry in a second for sure, if no other replica of the node sends any.
+    pub fn records_left(&self, tdma: &Tdma, replica: &PlannedReplica) -> f64 {
+        self.parts_left(tdma, replica.node) as f64 / (1000 * replica.parts(&self.link)) as f64
+    }
+
     /// The least time in which a record of full size leaves, to all nodes that have the replica.
     pub fn record_least(&self, tdma: &Tdma, replica: &PlannedReplica) -> Duration {
         let supply = supply(tdma, &self.link, replica.node);

@@ -1,0 +1,121 @@
+//! What crosses the wire for ten readers of one replica on one node, beside what crosses it for one: each record once.
+
+use crate::cases::Case;
+use crate::cases::lan::ground::{LanSegment, replicating};
+use crate::harness::{Child, End, Failure, Gate, Shared, Zeroable};
+use crate::lan::flow::{FILLER, Inlet, Outlet, checked, put_number};
+use crate::lan::nodes::index;
+use crate::lan::records::{RecordInlet, RecordOutlet};
+use crate::lan::sent::Sent;
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use crate::statistics::{Summary, median};
+use rohrpost_mailbox::StreamShape;
+use std::cell::RefCell;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+const BYTES: usize = 62_000;
+const READERS: u32 = 10;
+const RECORDS: usize = 200;
+/// With some seats to spare, since readers of the turn before may still be there.
+const SHAPE: StreamShape = StreamShape { record_bytes: BYTES as u32, keep: 64, readers: 32, late: Duration::ZERO };
+/// From one record to the next: a wire that keeps pace.
+const EACH: Duration = Duration::from_millis(2);
+const ENDS_WITHIN: Duration = Duration::from_secs(30);
+/// Ours, and what is compared with it.
+const ALL: &str = "rohrpost";
+const ONE: &str = "one reader";
+const ONCE: &str = "its bytes";
+
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    vec![Box::new(ReplicaReaders)]
+}
+
+struct ReplicaReaders;
+
+impl Case for ReplicaReaders {
+    fn name(&self) -> String {
+        "replica, ten readers".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let ground = LanSegment::new(settings, &replicating(SHAPE));
+        let records = settings.count(RECORDS) as u64;
+        let packets = RefCell::new(Vec::new());
+        let read_by = |contender, readers| {
+            let (ground, packets) = (&ground, &packets);
+            Contender::single(contender, move || {
+                let sent = watch(ground, readers, records)?;
+                packets.borrow_mut().push((contender, sent.packets as f64 / records as f64));
+                Ok(sent.bytes as f64 / records as f64)
+            })
+        };
+        let contenders = [read_by(ALL, READERS), read_by(ONE, 1), Contender::single(ONCE, || Ok(BYTES as f64))];
+        let versus = [
+            // Descriptions and what routers say to each other are in both.
+            Versus { name: ONE, p50: Some(Target::AtMost(1.02)), p99: None },
+            Versus { name: ONCE, p50: None, p99: None },
+        ];
+        let subject = |case: String, unit| Subject { case, bytes: Some(BYTES), unit };
+        let mut rows = compare(settings, &subject(self.name(), "B"), &contenders, &versus);
+        let packets = packets.borrow();
+        rows.extend([ALL, ONE].into_iter().filter_map(|contender| {
+            let own = packets.iter().filter(|(name, _)| *name == contender).map(|(_, packets)| *packets);
+            let figure = Summary::single(median(own)?);
+            Some(Row::alone(subject(format!("{}, packets", self.name()), "a record"), contender, Ok(figure)))
+        }));
+        Ok(rows)
+    }
+}
+
+#[repr(C)]
+struct Watched {
+    gate: Gate,
+    bytes: AtomicU64,
+    packets: AtomicU64,
+}
+
+// SAFETY: atomics only.
+unsafe impl Zeroable for Watched {}
+
+/// What leaves the origin's node until so many readers of the replica have read all records.
+fn watch(ground: &LanSegment, readers: u32, records: u64) -> Result<Sent, Failure> {
+    let ((nodes, _), wire, watched) = (ground.turn()?, ground.wire()?, Shared::<Watched>::new()?);
+    let (origin, all) = (index(End::Ping), readers + 1);
+    // All meet before the first record and behind the last one.
+    let reader = || {
+        let mut outlet = RecordOutlet::open(&nodes.directory(End::Pong), origin)?;
+        watched.gate.meet(all)?;
+        let mut record = vec![0; BYTES];
+        for due in 0..records {
+            let came = if outlet.receive(&mut record)? { Some(checked(&record)?) } else { None };
+            if came != Some(due) {
+                return Err(Failure::Failed(format!("record {due} was due, and {came:?} came")));
+            }
+        }
+        watched.gate.meet(2 * all)
+    };
+    let writer = || {
+        wire.enter(End::Ping)?;
+        let mut inlet = RecordInlet::open(&nodes.directory(End::Ping), origin, SHAPE)?;
+        watched.gate.meet(all)?;
+        let (before, mut record) = (Sent::now()?, vec![FILLER; BYTES]);
+        for number in 0..records {
+            put_number(&mut record, number);
+            inlet.send(&record)?;
+            std::thread::sleep(EACH);
+        }
+        watched.gate.meet(2 * all)?;
+        let sent = Sent::now()?.since(before);
+        watched.bytes.store(sent.bytes, Ordering::Release);
+        watched.packets.store(sent.packets, Ordering::Release);
+        Ok(())
+    };
+    let mut children = (0..readers).map(|_| Child::start(reader)).collect::<Result<Vec<_>, Failure>>()?;
+    children.push(Child::start(writer)?);
+    let deadline = Instant::now() + ENDS_WITHIN;
+    children.into_iter().try_for_each(|child| child.finish(deadline))?;
+    let of = |count: &AtomicU64| count.load(Ordering::Acquire);
+    Ok(Sent { bytes: of(&watched.bytes), packets: of(&watched.packets) })
+}

@@ -1,0 +1,182 @@
+//! Streams of a node, and their replicas on others.
+//!
+//! ```text
+//!  inlet ─▶ ring ─▶ router ══ parts ══▶ router ─▶ ring of the same name ─▶ outlet
+//! ```
+//! A record is written whole and read in place. Which records come is the routers' matter; what reads them counts.
+
+use super::flow::{Inlet, Outlet, look_at};
+use super::router::SYSTEM;
+use crate::harness::{Child, Failure, Link};
+use crate::streams::{came, stamp, stream_failure};
+use rohrpost_mailbox::{
+    Class, Name, Next, Node, Participant, Shape, StreamId, StreamReader, StreamShape, StreamWriter, Waiting,
+};
+use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Class of the modules that write streams.
+pub const RECORDS: Class = Class(150);
+/// The stream of each, in its description.
+const ITEM: &str = "record";
+const NUMBER: u16 = 1;
+/// Routers look for new streams twice a second, and send descriptions once.
+const BEGINS_WITHIN: Duration = Duration::from_secs(20);
+const WRITE_EACH: Duration = Duration::from_millis(5);
+/// After this silence nothing more comes: on a busy computer a record of some thousand datagrams takes a while.
+const SILENCE: Duration = Duration::from_secs(1);
+/// Routers wait as long for lost parts.
+const DEADLINE: &str = "1 s";
+
+fn stream(instance: u8) -> StreamId {
+    StreamId { name: Name::new(SYSTEM, RECORDS.0, instance, 0), number: NUMBER }
+}
+
+/// The module, its stream and its replica, as configurations have them. It is never launched: processes of the bench
+/// take its place.
+pub fn entries(instance: u8, node: &str, to: &[&str], shape: StreamShape) -> String {
+    let StreamShape { record_bytes, keep, readers, .. } = shape;
+    format!(
+        "[[module]]\nname = \"records.{instance}\"\nnode = \"{node}\"\nprogram = \"records\"\noptional = true\n\
+         [module.stream.{ITEM}]\nrecord = \"{record_bytes} B\"\nkeep = {keep}\nreaders = {readers}\n\
+         [[replica]]\nstream = \"records.{instance}/{ITEM}\"\nto = {to:?}\ndeadline = \"{DEADLINE}\"\n"
+    )
+}
+
+/// Makes the stream on the node in the first directory, and waits until that in the second one has its replica. Records
+/// without bytes are written meanwhile, of which some may be on their way still: what reads passes over them.
+///
+/// # Errors
+/// When that takes too long.
+pub fn begin(from: &Path, to: &Path, instance: u8, shape: StreamShape) -> Result<(), Failure> {
+    let begun = Child::start(|| {
+        let participant = join(from)?;
+        let module = participant.receiver(stream(instance).name, Shape::default());
+        let module = module.map_err(|error| Failure::of("mailbox", error))?;
+        // It stays when its mailbox has no owner any more.
+        module.set_about(&description().to_bytes()).map_err(|error| Failure::of("description", error))?;
+        let (mut inlet, mut outlet) = (RecordInlet::open(from, instance, shape)?, RecordOutlet::open(to, instance)?);
+        loop {
+            inlet.send(&[])?;
+            if outlet.has_any()? {
+                return Ok(());
+            }
+            std::thread::sleep(WRITE_EACH);
+        }
+    })?;
+    begun.finish(Instant::now() + BEGINS_WITHIN).map_err(|failure| Failure::of("a replica does not begin", failure))
+}
+
+fn description() -> Description {
+    let field = Field::new(ITEM, Type::U64);
+    let item = DataItem { number: NUMBER, kind: DataKind::Stream, field };
+    let (name, class) = ("Recording".into(), "records".into());
+    Description { name, class, text: String::new(), functions: Vec::new(), data: vec![item] }
+}
+
+fn join(directory: &Path) -> Result<Arc<Participant>, Failure> {
+    let node = Node::open(directory).map_err(|error| Failure::of("node", error))?;
+    Participant::join(&node, Name::NONE).map_err(|error| Failure::of("node", error))
+}
+
+/// The writing side.
+pub struct RecordInlet {
+    writer: StreamWriter,
+}
+
+impl RecordInlet {
+    /// Writes the stream of this instance, on the node in this directory.
+    ///
+    /// # Errors
+    /// When somebody else does, or there is no memory for it.
+    pub fn open(directory: &Path, instance: u8, shape: StreamShape) -> Result<Self, Failure> {
+        let writer = join(directory)?.stream_writer(stream(instance), shape).map_err(stream_failure)?;
+        Ok(Self { writer })
+    }
+}
+
+impl Inlet for RecordInlet {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        let stamp = stamp(self.writer.written());
+        self.writer.write(stamp, message).map(drop).map_err(|error| Failure::of("write", error))
+    }
+}
+
+/// The reading side.
+pub struct RecordOutlet {
+    reader: StreamReader,
+}
+
+impl RecordOutlet {
+    /// Reads the replica of the stream of this instance, on the node in this directory, from the next record on.
+    ///
+    /// # Errors
+    /// When all its seats are taken.
+    pub fn open(directory: &Path, instance: u8) -> Result<Self, Failure> {
+        let reader = join(directory)?.stream_reader(stream(instance)).map_err(stream_failure)?;
+        Ok(Self { reader })
+    }
+
+    /// Whether there is a record; takes it.
+    fn has_any(&mut self) -> Result<bool, Failure> {
+        let next = self.reader.try_next().map_err(stream_failure)?;
+        Ok(matches!(next, Next::Record(_)))
+    }
+}
+
+impl Outlet for RecordOutlet {
+    fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
+        let mut waiting = Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + SILENCE) };
+        loop {
+            match self.reader.next_timeout(waiting).map_err(stream_failure)? {
+                Next::Record(record) if !record.body().is_empty() => {
+                    return look_at(record.body(), message).map(|()| true);
+                }
+                // One of those with which it began, or some are lost: the numbers of those that come say so.
+                Next::Record(_) | Next::Lost(_) => waiting.deadline = Some(Instant::now() + SILENCE),
+                Next::Nothing => return Ok(false),
+            }
+        }
+    }
+}
+
+/// One end of a ping-pong: a stream that it writes, and the replica of the other's.
+pub struct RecordLink {
+    inlet: RecordInlet,
+    reader: StreamReader,
+    body: Vec<u8>,
+}
+
+impl RecordLink {
+    /// An end on the node in this directory: instances of what it writes, and of what it reads.
+    ///
+    /// # Errors
+    /// When a stream cannot be opened.
+    pub fn open(directory: &Path, [own, other]: [u8; 2], shape: StreamShape) -> Result<Self, Failure> {
+        let inlet = RecordInlet::open(directory, own, shape)?;
+        let RecordOutlet { reader } = RecordOutlet::open(directory, other)?;
+        Ok(Self { inlet, reader, body: Vec::with_capacity(shape.record_bytes as usize) })
+    }
+}
+
+impl Link for RecordLink {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        Inlet::send(&mut self.inlet, message)
+    }
+
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        let waiting = Waiting { spin: Duration::ZERO, deadline: None };
+        let mut info = came(self.reader.next_timeout_into(&mut self.body, waiting))?;
+        while info.len_bytes == 0 {
+            // One of those with which it began.
+            info = came(self.reader.next_timeout_into(&mut self.body, waiting))?;
+        }
+        if info.len_bytes != message.len() {
+            return Err(Failure::Failed(format!("{} bytes came, not {}", info.len_bytes, message.len())));
+        }
+        message.copy_from_slice(&self.body);
+        Ok(())
+    }
+}
