@@ -84,3 +84,7 @@ pub(crate) const SEEN_IN_A_HUNDRED_EDITED: [(&str, u64); 4] =
 /// The same of unsteady clocks.
 pub(crate) const SEEN_IN_A_HUNDRED_UNSTEADY: [(&str, u64); 4] =
     [("asleep", 30), ("slewed", 30), ("time: unsteady", 60), ("delivered", 20_000)];
+/// The same of replicas.
+pub(crate) const SEEN_IN_A_HUNDRED_REPLICATED: [(&str, u64); 1] = [("a record read", 100)];
+/// The same of replicas in time slots.
+pub(crate) const SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED: [(&str, u64); 1] = [("a record read", 100)];

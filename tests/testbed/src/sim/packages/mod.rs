@@ -86,6 +86,11 @@ impl Packages {
         &self.stats
     }
 
+    /// The same, for what counts beside.
+    pub(super) fn all_stats(&self) -> &Arc<Stats> {
+        &self.stats
+    }
+
     /// Its sessions, where datagrams are sealed.
     pub(super) fn peer_sessions(&self) -> Option<&Arc<PeerSessions>> {
         self.seals.as_ref().map(|seals| &seals.all)

@@ -63,7 +63,6 @@ impl Plan {
             oversleeps_percent: 0,
             divisions: Divisions::default(),
             joins_ns: None,
-            replicates: false,
         });
         plan.time_slots();
         plan.draw_all(chance);
