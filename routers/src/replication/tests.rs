@@ -2,11 +2,13 @@
 
 mod asked;
 mod changed;
+mod damaged;
 mod hostile;
 mod joining;
 mod lossy;
 mod requests;
 mod sealed;
+mod stepped;
 
 use super::{Describe, ReceivedReplica, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};

@@ -55,8 +55,8 @@ fn routers(plan: &Rc<Plan>, rings: &Rc<Rings>) -> NewLayers<'static> {
             (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all, plan.slots.is_some()));
         }
         let has_streams = !plan.streams.is_empty();
-        let replicas = has_streams
-            .then(|| Replicas::new((&settings, packages.all_stats()), &rings, packages.peer_sessions()));
+        let replicas =
+            has_streams.then(|| Replicas::new((&settings, packages.all_stats()), &rings, packages.peer_sessions()));
         if let Some(slots) = plan.slots_of(edition) {
             let (own, nodes) = (settings.own, plan.nodes.len() as u8);
             let table = SlotTable::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());

@@ -32,13 +32,13 @@ fn sealed_replicas_keep_their_promises() {
 
 #[test]
 fn replicas_in_time_slots_keep_their_promises() {
-    let plan = |seed| Plan::slotted(seed).replicated();
+    let plan = |seed| Plan::small_slotted(seed).replicated();
     replicated("replicas_in_time_slots_keep_their_promises", plan, &SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED);
 }
 
 #[test]
 fn sealed_replicas_in_time_slots_keep_their_promises() {
-    let plan = |seed| Plan::slotted(seed).sealed().replicated();
+    let plan = |seed| Plan::small_slotted(seed).sealed().replicated();
     replicated("sealed_replicas_in_time_slots_keep_their_promises", plan, &SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED);
 }
 

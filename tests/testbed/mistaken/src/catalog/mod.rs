@@ -20,6 +20,7 @@ pub const GROUPS: &[Group] = &[
     lan::LAN,
     rejecting::REJECTING,
     replicas::REPLICAS,
+    replicas::RECORDS,
     session::SESSION,
     slots::IN_SLOT,
     slots::SLOTS,

@@ -26,8 +26,8 @@ pub(super) struct StreamBook {
     written: HashMap<(u32, u64), WrittenRecord>,
     /// How often it was made anew.
     pub(super) generation: u32,
-    /// When it was made anew, or its module described itself anew, last, true ns.
-    pub(super) changed_ns: u64,
+    /// How often that happened, or its module described itself anew: then its replicas begin anew, too.
+    pub(super) changes: u32,
     /// How many records were written.
     pub(super) count: u64,
     /// The one that was written last, with the incarnation of its writer.
@@ -94,7 +94,9 @@ impl RecordBooks {
             return Err(format!("{says:?} of stream {stream} was written as {record:?}"));
         }
         if body(record.start, record.len)[offset..end] != *bytes {
-            return Err(format!("bytes {offset}..{end} of {says:?} of stream {stream} are not those that were written"));
+            return Err(format!(
+                "bytes {offset}..{end} of {says:?} of stream {stream} are not those that were written"
+            ));
         }
         Ok(*record)
     }

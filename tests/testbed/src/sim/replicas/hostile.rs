@@ -6,9 +6,7 @@ use super::super::station::{Arrived, Origin};
 use super::super::world::{Event, World};
 use super::super::{clock::Now, packages::digest, spans::MS};
 use super::PORT;
-use rohrpost_routers::frame::{
-    DescriptionPart, FrameHead, FrameKind, PART_REQUEST_BYTES_MAX, PartRequest, RecordPart,
-};
+use rohrpost_routers::frame::{DescriptionPart, FrameHead, FrameKind, PART_REQUEST_BYTES_MAX, PartRequest, RecordPart};
 
 impl World<'_> {
     /// A node sends another one what it should not.

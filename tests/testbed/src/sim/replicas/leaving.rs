@@ -2,16 +2,18 @@
 //! and requests and repeated parts are bounded as `routers/src/replication` promises.
 
 use super::PORT;
+use super::accounts::Sums;
 use crate::sim::promise::Promise;
 use crate::sim::seals::{checked, sealed};
 use crate::sim::spans::S;
 use crate::sim::station::{Io, Sent};
+use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Head, OriginRecord, Stamp};
 use rohrpost_routers::counts::Cause;
 use rohrpost_routers::driver::NotSent;
 use rohrpost_routers::frame::{Frame, NodeIndex, PartRequest, RecordPart, ReplicaFrame};
 use rohrpost_routers::outbound::Outbound;
-use rohrpost_routers::replication::SentReplica;
+use rohrpost_routers::replication::{ReplicaLoss, SentReplica};
 use rohrpost_routers::report::Report;
 use rohrpost_routers::security::{PeerSessions, Sealing};
 use rohrpost_routers::settings::Settings;
@@ -34,9 +36,9 @@ impl Report for NoPackages {
     fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], _: Cause) {}
 }
 
-/// The parts that leave again count as those of one sending: receiver and its incarnation, place, generation and
-/// description of the stream, sequence.
-type Repeated = (NodeIndex, u64, u16, u16, u32, u64);
+/// Where records leave to one after the other: receiver and its incarnation, place, generation and description of the
+/// stream.
+type Course = (NodeIndex, u64, u16, u16, u32);
 /// Requests for one record: place, router and generation of its stream, sequence, first part.
 type Requested = (u16, u64, u16, u64, u32);
 
@@ -52,7 +54,10 @@ pub(super) struct Leaving {
     again: Vec<u64>,
     part_bytes: u64,
     overhead_bytes: usize,
-    repeated: HashMap<Repeated, u64>,
+    /// With which sequence each began, as far as is counted, the last that left, and how many passed an absent node.
+    firsts: HashMap<Course, (u64, u64, u64)>,
+    /// Parts that left again, of each record.
+    repeated: HashMap<(Course, u64), u64>,
     requested: HashMap<Requested, u64>,
     /// When requests for each replica left, ns.
     asked_ns: HashMap<u16, VecDeque<u64>>,
@@ -75,6 +80,7 @@ impl Leaving {
             counts,
             part_bytes: (settings.network.datagram_bytes_max - head_bytes) as u64,
             overhead_bytes: settings.overhead_bytes(),
+            firsts: HashMap::new(),
             repeated: HashMap::new(),
             requested: HashMap::new(),
             asked_ns: HashMap::new(),
@@ -136,19 +142,42 @@ impl Leaving {
             let text = format!("node {} sends a part of {says:?} to node {to}, which has no replica", io.node);
             return io.oracle.broken(io.now, Promise::RecordBounds, text);
         };
-        let again = self.counts[at].again.get();
+        let (again, incarnation) = (self.counts[at].again.get(), self.all.peer(to).link.incarnation.get());
+        let course = (to, incarnation, part.place, part.generation, part.description);
         if std::mem::replace(&mut self.again[at], again) == again {
-            return;
+            return self.accounts(io, at, course, part);
         }
         io.oracle.saw("a part of a record again");
-        let incarnation = self.all.peer(to).link.incarnation.get();
-        let key = (to, incarnation, part.place, part.generation, part.description, part.sequence);
-        let count = self.repeated.entry(key).or_default();
+        let count = self.repeated.entry((course, part.sequence)).or_default();
         *count += 1;
         let most = u64::from(part.len).div_ceil(self.part_bytes).max(1) + MORE_AGAIN;
         if *count > most {
             let text = format!("node {} sends {count} parts of {says:?} to node {to} again, {most} at most", io.node);
             io.oracle.broken(io.now, Promise::RecordBounds, text);
+        }
+    }
+
+    /// A record begins to leave: all before it were sent, or are counted with a cause, each of them once.
+    fn accounts(&mut self, io: &mut Io<'_>, at: usize, course: Course, part: &RecordPart<'_>) {
+        if part.offset > 0 {
+            return;
+        }
+        let Sums { sent, not_sent } = Sums::of(&self.counts[at]);
+        let is_whole = part.bytes.len() == part.len as usize;
+        let first = part.sequence.wrapping_add(is_whole.into()).wrapping_sub(sent + not_sent);
+        let now = (first, part.sequence, self.counts[at].lost.of(ReplicaLoss::Absent));
+        let (before, last, absent) = std::mem::replace(self.firsts.entry(course).or_insert(now), now);
+        // To a node that was away the newest goes whatever became of it there, or it is passed over: it counts twice.
+        let its = &io.plan.streams[usize::from(part.place)];
+        let was_away = part.sequence <= last || now.2 > absent;
+        let is_again = was_away || its.changed || its.sampling != Sampling::Each;
+        if before.wrapping_sub(first) > u64::from(is_again) {
+            let text = format!(
+                "node {} begins with record {} of stream {}; {sent} were sent to node {}, {not_sent} are counted with a \
+                 cause, and it began with {before}",
+                io.node, part.sequence, part.place, course.0
+            );
+            io.oracle.broken(io.now, Promise::RecordAccounts, text);
         }
     }
 
