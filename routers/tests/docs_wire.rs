@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use rohrpost_mailbox::{Head, Name, Priority, Type};
-use rohrpost_routers::frame::{Alive, Fragment, Frame, FrameHead, FrameKind, Refusal, RefusalReason, VERSION};
+use rohrpost_routers::frame::{
+    Alive, Fragment, Frame, FrameHead, FrameKind, RecordPart, Refusal, RefusalReason, ReplicaFrame, VERSION,
+};
 use rohrpost_routers::session::frame::HOPS_MAX;
 use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, HANDSHAKE_MAX_NS};
 use rohrpost_routers::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
@@ -71,6 +73,30 @@ fn a_fragment_has_the_documented_bytes() {
     let rest = [&part.head_bytes()[..], part.bytes].concat();
     let head = FrameHead { kind: FrameKind::Fragment, sequence: 9, ..HEAD };
     check("fragment", head, &rest, |frame| assert_eq!(frame, Frame::Fragment(part)));
+}
+
+#[test]
+fn a_record_part_has_the_documented_bytes() {
+    const STAMP_NS: u64 = 1_700_000_000_000_000_000;
+    let part = RecordPart {
+        place: 1,
+        generation: 2,
+        description: 0x0102_0304,
+        incarnation: 77,
+        len: 1376,
+        offset: 1372,
+        sequence: 300,
+        epoch: 3,
+        stamp_ns: STAMP_NS,
+        written_ns: STAMP_NS + 100_000,
+        error_ns: 2500,
+        step: 10,
+        sampled: 270,
+        bytes: b"part",
+    };
+    let rest = [&part.head_bytes()[..], part.bytes].concat();
+    let head = FrameHead { kind: FrameKind::RecordPart, sequence: 12, ..HEAD };
+    check("record-part", head, &rest, |frame| assert_eq!(frame, Frame::Replica(ReplicaFrame::Record(part))));
 }
 
 #[test]

@@ -8,8 +8,9 @@ use crate::recorded_nodes::values;
 use nix::sys::signal::Signal;
 use rohrpost::Name;
 use rohrpost::wire::from_bytes;
-use rohrpost_mailbox::{Next, Participant, RecordInfo, StreamId, StreamReader};
+use rohrpost_mailbox::{Missed, Next, Participant, RecordInfo, StreamId, StreamReader};
 use rohrpost_recording::info;
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -125,8 +126,16 @@ impl Pair {
     }
 
     pub(crate) fn launched_at(addresses: &[String; 2], network: &str) -> Self {
+        Self::launched_with(addresses, network, "")
+    }
+
+    /// `stream`: further keys of the replica's stream.
+    fn launched_with(addresses: &[String; 2], network: &str, stream: &str) -> Self {
         let place = Place::new();
         let config = config(&place, addresses, network);
+        let (plain, keys) =
+            ("stream = \"feeder.0/frame\"", format!("stream = {{ name = \"feeder.0/frame\"{stream} }}"));
+        std::fs::write(&config, std::fs::read_to_string(&config).unwrap().replace(plain, &keys)).unwrap();
         if network.contains("keys") {
             place.say(&["keys", "new", config.to_str().unwrap()]).ok();
         }
@@ -251,21 +260,69 @@ fn recorded(place: &Place) -> Vec<(u32, u64)> {
     values(&file(place), "feeder.0/frame")
 }
 
-/// Has so many records written, and waits for one behind them; how many are recorded since the first, and how many were
-/// lost: all that were written.
-fn feed_and_count(place: &Place, mut launch: Running, count: u64) -> (u64, u64) {
+/// Has so many records written, and waits for one behind them; how many are recorded since the first, how many were
+/// missed: all that were written; and how many of them were lost on the way.
+fn feed_and_count(place: &Place, mut launch: Running, count: u64) -> (u64, u64, u64) {
     let target = feed(place, "feeder.0", count);
     wait("records behind the last of them", || {
         feed(place, "feeder.0", 1);
         recorded(place).last().is_some_and(|(_, number)| *number > target).then_some(())
     });
+    let info = ["stream", "info", "feeder.0", "frame", "--json"];
+    let missed = place.say_at(&place.path("test.toml"), "brain", &info).json()["missed"].clone();
     launch.stop();
     let (recorded, told) = (recorded(place), info(&file(place)).unwrap());
     assert!(recorded.is_sorted_by(|a, b| a.1 < b.1), "{recorded:?}");
     let channel = told.channels.iter().find(|channel| channel.topic == "feeder.0/frame").unwrap();
     let (first, last) = (recorded[0].1, recorded[recorded.len() - 1].1);
     assert!(recorded.len() as u64 + channel.lost > last - first, "{} recorded, {} lost", recorded.len(), channel.lost);
-    (recorded.len() as u64, channel.lost)
+    // The ring's own count: the recorder came later, and may be slow.
+    assert!(missed["lost"].as_u64().is_some() && missed["sampled"] == 0, "{missed}");
+    (recorded.len() as u64, channel.lost, missed["lost"].as_u64().unwrap())
+}
+
+/// Both nodes on the loopback device, with these further keys of the replica's stream; how many of each cause a reader
+/// on the other node has missed that reads while so many are written, or after that, and what `stream info` says.
+fn missed(stream: &str, count: u64, is_slow: bool) -> (Missed, Value) {
+    let pair = Pair::launched_with(&addresses(), NETWORK, stream);
+    let mut there = Follower::new(&pair.brain.1);
+    let id = there.reader.id();
+    let mut feed_until = |what: &str, written: u64, follow: bool| {
+        wait(what, || {
+            pair.say("base", &["call", "feeder.0", "feed", "1"]);
+            if follow {
+                there.follow();
+            }
+            let info = pair.brain.1.node.inspect_stream(id).unwrap();
+            info.map(|info| info.written).filter(|there| *there >= written)
+        })
+    };
+    let first = feed_until("the replica begins", 1, true);
+    pair.say("base", &["call", "feeder.0", "feed", &count.to_string()]);
+    let newest = feed_until("the last one, or a newer one, is there", first + count, !is_slow);
+    there.follow();
+    assert_eq!(there.reader.missed().all(), there.reader.accounts().1, "each has a cause");
+    assert!(there.reader.position() >= newest);
+    let at = ["--config", pair.config.to_str().unwrap(), "--node", "brain", "--json"];
+    let info = pair.place.say(&[&["stream", "info", "feeder.0", "frame"][..], &at].concat()).json();
+    let missed = there.reader.missed();
+    drop(there);
+    pair.stop().assert_empty();
+    (missed, info["missed"].clone())
+}
+
+#[test]
+fn what_sampling_leaves_out_is_told_so() {
+    let (missed, told) = missed(", every = 5", 100, false);
+    assert!(missed.sampled >= 60 && missed.passed_over == 0, "{missed:?}");
+    assert!(told["sampled"].as_u64() >= Some(missed.sampled), "{told}");
+}
+
+#[test]
+fn what_a_reader_is_too_slow_for_is_told_so() {
+    let (missed, told) = missed("", 700, true);
+    assert!(missed.passed_over > 0 && missed.sampled == 0, "{missed:?}");
+    assert!(told["passed_over"].as_u64() >= Some(missed.passed_over), "{told}");
 }
 
 #[test]
@@ -274,8 +331,8 @@ fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
     let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=22"];
     // What is lost stays lost.
     let Some(launch) = followed(&place, NETWORK, "deadline = \"0 ms\"\n", &bad) else { return };
-    let (recorded, lost) = feed_and_count(&place, launch, 300);
-    assert!(lost > 0 && recorded > 100, "{recorded} recorded, {lost} lost");
+    let (recorded, missed, lost) = feed_and_count(&place, launch, 300);
+    assert!(missed > 0 && lost > 0 && recorded > 100, "{recorded} recorded, {missed} missed, {lost} lost on the way");
     place.assert_empty();
 }
 
@@ -283,7 +340,7 @@ fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
 fn in_time_slots_records_cross_as_well() {
     let place = Place::new();
     let Some(launch) = followed(&place, SLOTS, "", &[]) else { return };
-    let (recorded, lost) = feed_and_count(&place, launch, 200);
-    assert!(recorded > 100, "{recorded} recorded, {lost} lost");
+    let (recorded, missed, _) = feed_and_count(&place, launch, 200);
+    assert!(recorded > 100, "{recorded} recorded, {missed} missed");
     place.assert_empty();
 }

@@ -240,8 +240,10 @@ fn check_tool(tool: Running, odometry: &ObservedStream, written: u64) {
     tool.signal(Signal::SIGINT);
     let mut at = 0;
     for object in printed(&tool.said().ok()) {
-        if let Some(lost) = object["lost"].as_u64() {
-            at += lost;
+        if let [Some(lost), Some(sampled), Some(passed_over)] =
+            ["lost", "sampled", "passed_over"].map(|cause| object[cause].as_u64())
+        {
+            at += lost + sampled + passed_over;
             continue;
         }
         assert_eq!(object["sequence"], at, "no record is left out");

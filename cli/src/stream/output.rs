@@ -2,10 +2,10 @@
 //! or the bytes as they are.
 
 use super::stamp::stamp_text;
-use super::view::RecordView;
+use super::view::{MissedView, RecordView};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::schema::{Type, Value, decode};
-use rohrpost_mailbox::{RecordInfo, monotonic_ns};
+use rohrpost_mailbox::{Missed, RecordInfo, monotonic_ns};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::fs::File;
@@ -183,18 +183,32 @@ impl RecordOutput {
         }
     }
 
-    /// Says how many records were lost here.
-    pub(super) fn lost(&self, lost: u64) {
+    /// Says which records were missed here, and why.
+    pub(super) fn missed(&self, missed: Missed) -> Result<(), Failure> {
         let text = match self.form.json {
-            true => serde_json::json!({ "lost": lost }).to_string(),
-            false => format!("(lost {lost}: newer records took their places before they were read)"),
+            true => serde_json::to_string(&MissedView::from(missed))?,
+            false => missed_text(missed),
         };
         if matches!(self.raw, Some(RawOutput::Stdout)) {
             complain(text);
         } else {
             say(text);
         }
+        Ok(())
     }
+}
+
+/// Records that were missed one after the other, in one line.
+fn missed_text(missed: Missed) -> String {
+    let Missed { lost, sampled, passed_over } = missed;
+    let causes = [
+        (lost, "lost on the way"),
+        (sampled, "left out by sampling"),
+        (passed_over, "passed over: newer records took their places before they were read"),
+    ];
+    let told: Vec<_> =
+        causes.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{count} {why}")).collect();
+    format!("({} missed: {})", missed.all(), told.join(", "))
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -233,6 +247,17 @@ mod tests {
         let form = RecordForm::new(false, 64);
         let told = ["before", "after"].map(|side| form.line(Some(side), &record(1), RecordContent::Elsewhere).unwrap());
         assert_eq!(told, ["before  #7  1700000000.250000000  1 B", "after   #7  1700000000.250000000  1 B"]);
+    }
+
+    #[test]
+    fn what_was_missed_is_told_by_cause() {
+        for (lost, sampled, passed_over, text) in [
+            (0, 9, 0, "(9 missed: 9 left out by sampling)"),
+            (1, 9, 0, "(10 missed: 1 lost on the way, 9 left out by sampling)"),
+            (0, 0, 2, "(2 missed: 2 passed over: newer records took their places before they were read)"),
+        ] {
+            assert_eq!(missed_text(Missed { lost, sampled, passed_over }), text);
+        }
     }
 
     fn object(bytes_max: usize, ty: Option<&Type>, body: &[u8]) -> serde_json::Value {

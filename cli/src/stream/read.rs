@@ -105,21 +105,27 @@ impl StreamReading<'_> {
             self.reader.seek(from);
         }
         let (patience, stop) = (seconds(self.arguments.timeout)?, Stop::new()?);
-        let (mut count, mut last_at) = (0, Instant::now());
+        let (mut count, mut last_at, mut told) = (0, Instant::now(), self.reader.missed());
         while !stop.within(Duration::ZERO) {
             let next = self.reader.next_timeout_into(&mut self.body, LOOK);
-            match next.map_err(|error| self.chosen.failure(&error))? {
+            let next = next.map_err(|error| self.chosen.failure(&error))?;
+            // All that was missed up to a record is one line before it.
+            let missed = self.reader.missed().since(&told);
+            if missed.all() > 0 && !matches!(next, Next::Lost(_)) {
+                self.output.missed(missed)?;
+                told = self.reader.missed();
+            }
+            match next {
                 Next::Record(record) => {
                     (count, last_at) = (count + 1, Instant::now());
                     if !self.output.record(None, &record, &self.body)? {
                         break;
                     }
                 }
-                Next::Lost(lost) => self.output.lost(lost),
                 Next::Nothing if !patience.is_zero() && last_at.elapsed() >= patience => {
                     return Err(format!("stream {}: no record within {patience:?}", self.chosen.text()).into());
                 }
-                Next::Nothing => {}
+                Next::Lost(_) | Next::Nothing => {}
             }
             if wanted.map_or(self.reader.position() >= end, |wanted| count >= wanted) {
                 break;

@@ -8,7 +8,7 @@ use crate::units::{bytes, short};
 use rohrpost::Name;
 use rohrpost::survey::StreamSurvey;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{RecordInfo, StreamId};
+use rohrpost_mailbox::{Missed, RecordInfo, StreamId};
 use serde::Serialize;
 use std::time::Duration;
 
@@ -40,6 +40,28 @@ pub(crate) struct StreamView {
     readers_max: u16,
     holding: u16,
     sleeping: u16,
+    missed: MissedView,
+}
+
+/// Records that were not read, by cause.
+#[derive(Serialize)]
+pub(super) struct MissedView {
+    lost: u64,
+    sampled: u64,
+    passed_over: u64,
+}
+
+impl From<Missed> for MissedView {
+    fn from(Missed { lost, sampled, passed_over }: Missed) -> Self {
+        Self { lost, sampled, passed_over }
+    }
+}
+
+impl MissedView {
+    fn text(&self) -> String {
+        let Self { lost, sampled, passed_over } = self;
+        format!("{lost} lost on the way, {sampled} left out by sampling, {passed_over} passed over by present readers")
+    }
 }
 
 #[derive(Serialize)]
@@ -116,6 +138,7 @@ impl StreamView {
             readers_max: shape.readers,
             holding: info.holding,
             sleeping: info.sleeping,
+            missed: info.missed.into(),
         }
     }
 
@@ -196,6 +219,7 @@ pub(super) fn print_stream(stream: &StreamView) -> String {
         ("late", late),
         ("written", stream.written.to_string()),
         ("refused", stream.refused.to_string()),
+        ("missed", stream.missed.text()),
         ("newest", record(&stream.newest)),
         ("oldest", record(&stream.oldest)),
         ("adoptions", stream.adoptions.to_string()),
@@ -232,6 +256,7 @@ mod tests {
             readers: 2,
             holding: 1,
             sleeping: 1,
+            missed: Missed { lost: 3, sampled: 4, passed_over: 5 },
         }
     }
 
@@ -271,6 +296,7 @@ camera.0  -           8  64 x 1024 B   0 of 8  nobody                        0  
   late        a stamp may be 50 ms behind the newest
   written     100
   refused     2
+  missed      3 lost on the way, 4 left out by sampling, 5 passed over by present readers
   newest      #99, stamp 1700000000.000000007 of epoch 2, 512 B, written 30 ms ago
   oldest      #36, stamp 1700000000.000000007 of epoch 2, 512 B, written 2.0 s ago
   adoptions   1"

@@ -9,7 +9,7 @@ pub const FRAME_HEAD_BYTES: usize = 36;
 /// Head of a fragment of a package, the package's head included.
 pub const FRAGMENT_HEAD_BYTES: usize = 32;
 /// Head of a part of a record, behind that of its datagram.
-pub const RECORD_PART_HEAD_BYTES: usize = 60;
+pub const RECORD_PART_HEAD_BYTES: usize = 64;
 /// Content of a datagram of time.
 pub const TIME_BYTES: usize = 72;
 /// Content of a keep-alive.

@@ -48,7 +48,15 @@ const PROOFS: [Proof; 3] = [
     },
     Proof {
         real: "real_stream",
-        parts: &["stream/ring", "stream/writing", "stream/lookup", "stream_rig", "stream_models"],
+        parts: &[
+            "stream/ring",
+            "stream/left_out",
+            "stream/missed",
+            "stream/writing",
+            "stream/lookup",
+            "stream_rig",
+            "stream_models",
+        ],
         models: stream_broken::MODELS,
         broken: &[stream_broken::BROKEN],
     },

@@ -8,8 +8,11 @@ use crate::name::Name;
 use crate::node::Node;
 use crate::owned::{BadSegment, OWNER_BYTE};
 use crate::stream::error::StreamError;
+use crate::stream::left_out::LeftOut;
 use crate::stream::lookup;
+use crate::stream::missed::Missed;
 use crate::stream::record::RecordInfo;
+use crate::stream::ring::Seat;
 use crate::stream::segment::{StreamSegment, path_of};
 use crate::stream::shape::{StreamId, StreamShape};
 use std::fs::File;
@@ -41,6 +44,9 @@ pub struct StreamInfo {
     pub holding: u16,
     /// Readers that sleep until the next record.
     pub sleeping: u16,
+    /// Records lost on the way and left out by sampling since the ring began, both up to the newest record; and passed
+    /// over by its readers of now, in sum.
+    pub missed: Missed,
 }
 
 impl Node {
@@ -70,6 +76,8 @@ impl Node {
         };
         let (says, ring) = (&segment.page().writer, segment.ring());
         // The first byte is the writer's. What a dead reader left in its seat says nothing any more.
+        let newest = ring.newest();
+        let left_out = newest.map_or_else(LeftOut::default, |line| line.about.left_out);
         let taken: Vec<_> = (OWNER_BYTE + 1..).zip(ring.seats()).filter(|(byte, _)| is_taken(&file, *byte)).collect();
         Ok(Some(StreamInfo {
             id,
@@ -79,12 +87,21 @@ impl Node {
             written: ring.written(),
             refused: says.refused.load(Ordering::Relaxed),
             oldest: lookup::oldest(&ring).map(|line| RecordInfo::of(&segment, &line)),
-            newest: ring.newest().map(|line| RecordInfo::of(&segment, &line)),
+            newest: newest.map(|line| RecordInfo::of(&segment, &line)),
             readers: taken.len() as u16,
             holding: taken.iter().filter(|(_, seat)| seat.hold.load(Ordering::Relaxed) != 0).count() as u16,
             sleeping: taken.iter().filter(|(_, seat)| seat.sleeper.load(Ordering::Relaxed) != 0).count() as u16,
+            missed: Missed {
+                lost: left_out.lost,
+                sampled: left_out.sampled,
+                passed_over: taken.iter().fold(0, |all, (_, seat)| all.saturating_add(passed_over(seat))),
+            },
         }))
     }
+}
+
+fn passed_over(seat: &Seat) -> u64 {
+    seat.passed_over.load(Ordering::Relaxed)
 }
 
 /// Whether somebody holds the lock of this byte. When that cannot be asked, nobody does.

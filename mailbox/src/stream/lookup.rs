@@ -93,7 +93,7 @@ fn first_reached(ring: &Ring<'_>, (low, newest): (u64, &Line), at: Stamp) -> Loo
 fn reached(ring: &Ring<'_>, sequence: u64) -> Option<Stamp> {
     match ring.look(sequence) {
         Look::There(line) => Some(line.reached()),
-        Look::Gone => ring.left_out(sequence),
+        Look::Gone => ring.left_out(sequence).map(|omission| omission.reached),
         Look::NotYet => Some(Stamp { epoch: u64::MAX, ns: u64::MAX }),
     }
 }
@@ -265,6 +265,11 @@ mod tests {
 
     const KEEP: usize = 8;
 
+    fn about(stamp: Stamp) -> About {
+        let (before_ns, written_ns, len_bytes, incarnation, left_out) = Default::default();
+        About { stamp, before_ns, written_ns, len_bytes, incarnation, left_out }
+    }
+
     #[derive(Default)]
     struct Memory {
         written: AtomicU64,
@@ -290,7 +295,7 @@ mod tests {
             let epoch = (at / epoch_every) as u64;
             let newest_ns = progress.newest().filter(|newest| newest.epoch == epoch).map_or(100, |newest| newest.ns);
             let stamp = Stamp { epoch, ns: newest_ns.saturating_add_signed(*step).max(newest_ns - late_ns) };
-            let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: 0, incarnation: 0 };
+            let about = about(stamp);
             let frame = progress.claim(&ring).unwrap();
             progress.publish(&ring, frame, about, |_| (), |_, _| ());
             taken.push(stamp);
@@ -334,8 +339,7 @@ mod tests {
         let ring = memory.ring();
         let mut progress = Progress::resume(&ring);
         for ns in [90, 100, 100, 100, 110] {
-            let about =
-                About { stamp: Stamp { epoch: 1, ns }, before_ns: 0, written_ns: 0, len_bytes: 0, incarnation: 0 };
+            let about = about(Stamp { epoch: 1, ns });
             let frame = progress.claim(&ring).unwrap();
             progress.publish(&ring, frame, about, |_| (), |_, _| ());
         }

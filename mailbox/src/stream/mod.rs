@@ -1,13 +1,16 @@
 //! Streams: rings of stamped records in shared memory, each with one writer and many readers. `ring` tells how.
 //!
-//! Reading order: `ring`, `writing`, `lookup` are the protocol; `shape`, `segment`, `bytes` the memory; `writer`,
-//! `replica`, `reader`, `record`, `error` what users hold; `files` which there are; `inspect` what each says of itself.
+//! Reading order: `ring`, `writing`, `left_out`, `missed`, `lookup` are the protocol; `shape`, `segment`, `bytes` the
+//! memory; `writer`, `replica`, `reader`, `record`, `error` what users hold; `files` which there are; `inspect` what each
+//! says of itself.
 
 mod bytes;
 mod error;
 mod files;
 mod inspect;
+mod left_out;
 mod lookup;
+mod missed;
 mod reader;
 mod record;
 mod replica;
@@ -19,6 +22,7 @@ mod writing;
 
 pub use error::{ReplicaError, StreamError, WriteError};
 pub use inspect::StreamInfo;
+pub use missed::Missed;
 pub use reader::StreamReader;
 pub use record::{Around, HeldRecord, Next, RecordInfo};
 pub use replica::{OriginRecord, ReplicaWriter};

@@ -3,6 +3,7 @@
 use crate::participant::Participant;
 use crate::stream::error::StreamError;
 use crate::stream::lookup::{self, Answer};
+use crate::stream::missed::{Missed, MissedAccount};
 use crate::stream::record::{Around, HeldRecord, Next, RecordInfo, TakenSeat};
 use crate::stream::ring::{Line, Look, Ring, SEQUENCE_MAX, Stamp, TRIES};
 use crate::stream::shape::{StreamId, StreamShape};
@@ -20,6 +21,7 @@ pub struct StreamReader {
     next: u64,
     read: u64,
     lost: u64,
+    missed: MissedAccount,
     eager: bool,
 }
 
@@ -31,11 +33,11 @@ impl Participant {
     /// [`StreamError::Crowded`] when all seats are taken, or what stands in the way of its file.
     pub fn stream_reader(self: &Arc<Self>, id: StreamId) -> Result<StreamReader, StreamError> {
         let participant = self.clone();
-        let (next, read, lost) = (0, 0, 0);
-        let mut reader =
-            StreamReader { participant, id, place: None, registry_epoch: None, next, read, lost, eager: false };
+        let (next, read, lost, missed) = (0, 0, 0, MissedAccount::default());
+        let (place, registry_epoch, eager) = (None, None, false);
+        let mut reader = StreamReader { participant, id, place, registry_epoch, next, read, lost, missed, eager };
         reader.follow()?;
-        reader.next = reader.ring().map_or(0, |ring| ring.written());
+        reader.go_to(reader.ring().map_or(0, |ring| ring.written()));
         Ok(reader)
     }
 }
@@ -63,7 +65,7 @@ impl StreamReader {
 
     /// Goes on from this sequence, at most 2^56: no stream comes to more. What is there no more counts as lost.
     pub fn seek(&mut self, sequence: u64) {
-        self.next = sequence.min(SEQUENCE_MAX);
+        self.go_to(sequence.min(SEQUENCE_MAX));
     }
 
     /// Passes over all that was written until now; it counts neither as read nor as lost.
@@ -88,7 +90,7 @@ impl StreamReader {
     pub fn pass_over(&mut self) -> Result<(), StreamError> {
         self.leave_retired()?;
         if let Some(ring) = self.ring() {
-            self.next = self.next.max(ring.written());
+            self.go_to(self.next.max(ring.written()));
         }
         Ok(())
     }
@@ -97,6 +99,30 @@ impl StreamReader {
     /// what it has not come to yet.
     pub fn accounts(&self) -> (u64, u64) {
         (self.read, self.lost)
+    }
+
+    /// The lost ones of [`StreamReader::accounts`] by cause, in records. What [`Next::Lost`] has told is among them,
+    /// except while the writer goes on so fast that no record behind it could be looked at: then it is from the next
+    /// one on.
+    ///
+    /// ```
+    /// use rohrpost_mailbox::{Missed, Name, Next, Node, Participant, Stamp, StreamId, StreamShape};
+    /// # let dir = tempfile::tempdir()?;
+    /// let node = Node::create(&dir.path().join("node"), 0o700)?;
+    /// let participant = Participant::join(&node, Name::new(1, 200, 0, 0))?;
+    /// let id = StreamId { name: Name::new(1, 200, 0, 0), number: 1 };
+    /// let mut writer = participant.stream_writer(id, StreamShape { keep: 4, ..StreamShape::default() })?;
+    /// let mut reader = participant.stream_reader(id)?;
+    /// for ns in 1..10 {
+    ///     writer.write(Stamp { epoch: 1, ns }, b"a picture")?;
+    /// }
+    /// let before = reader.missed();
+    /// assert!(matches!(reader.try_next()?, Next::Lost(5)), "the ring keeps 4");
+    /// assert_eq!(reader.missed().since(&before), Missed { lost: 0, sampled: 0, passed_over: 5 });
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn missed(&self) -> Missed {
+        self.missed.missed()
     }
 
     /// Whether there is something to read, or to be told.
@@ -215,10 +241,11 @@ impl StreamReader {
                 Look::There(line) if take(place, &line) => {
                     self.next += 1;
                     self.read += 1;
+                    self.missed.come_to(line.about.left_out);
                     return Ok(Next::Record(line));
                 }
                 Look::There(_) | Look::Gone => {
-                    let oldest = ring.oldest_after(self.next);
+                    let oldest = self.missed.miss(&ring, place.seat, self.next);
                     let lost = oldest - self.next;
                     self.next = oldest;
                     // Only damaged files and many jumps back come to so many.
@@ -302,11 +329,18 @@ impl StreamReader {
         // It was removed and made anew: what replaces a stream goes on with its sequence.
         let is_anew = self.place.as_ref().is_some_and(|old| place.ring().first() < old.ring().written());
         let is_first = self.place.is_none() && self.next == 0 && place.segment.is_replica();
-        if is_anew || is_first {
-            self.next = place.ring().first();
-        }
+        let next = if is_anew || is_first { place.ring().first() } else { self.next };
         self.place = Some(place);
+        self.go_to(next);
         Ok(true)
+    }
+
+    /// Goes on from this sequence.
+    fn go_to(&mut self, sequence: u64) {
+        self.next = sequence;
+        if let Some(place) = &self.place {
+            self.missed.begin(&place.ring(), sequence);
+        }
     }
 }
 

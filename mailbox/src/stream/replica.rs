@@ -41,7 +41,7 @@ pub struct OriginRecord {
 /// The one writer of a replica. Dropped, the stream stays, as with a [`StreamWriter`].
 ///
 /// ```
-/// use rohrpost_mailbox::{Name, Next, Node, OriginRecord, Participant, Stamp, StreamId, StreamShape};
+/// use rohrpost_mailbox::{Missed, Name, Next, Node, OriginRecord, Participant, Stamp, StreamId, StreamShape};
 /// # let dir = tempfile::tempdir()?;
 /// let node = Node::create(&dir.path().join("node"), 0o700)?;
 /// let participant = Participant::join(&node, Name::new(1, 200, 0, 0))?;
@@ -52,9 +52,10 @@ pub struct OriginRecord {
 /// replica.begin(record)?;
 /// replica.put(9, 2, b"picture");
 /// replica.put(9, 0, b"a ");
-/// replica.finish(9)?;
+/// replica.finish(9, 1)?;
 /// assert!(matches!(reader.try_next()?, Next::Lost(1)), "7 never came");
 /// assert!(matches!(reader.try_next()?, Next::Lost(1)), "nor did 8");
+/// assert_eq!(reader.missed(), Missed { lost: 1, sampled: 1, passed_over: 0 }, "8 was left out on purpose");
 /// let Next::Record(read) = reader.try_next()? else { panic!("it is there") };
 /// assert_eq!((read.body(), read.info().incarnation), (&b"a picture"[..], 3));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -159,12 +160,13 @@ impl ReplicaWriter {
     }
 
     /// Makes a record that is begun the newest one; an older one that is begun is given up. Each byte must have been
-    /// put: the rest is what an earlier record left there.
+    /// put: the rest is what an earlier record left there. Of the sequences between the newest before and this one the
+    /// last `sampled` were left out on purpose, as far as there are so many; readers are told the others as lost.
     ///
     /// # Errors
     /// See [`ReplicaError`]: it is not begun, or its stamp is too far behind what was finished since. Then it is given
     /// up.
-    pub fn finish(&mut self, sequence: u64) -> Result<(), ReplicaError> {
+    pub fn finish(&mut self, sequence: u64, sampled: u64) -> Result<(), ReplicaError> {
         let begun = self.at(sequence).and_then(|at| Some((at, self.begun[at].take()?)));
         let Some((at, BegunRecord { record, frame })) = begun else { return Err(self.passed(sequence)) };
         let Self { writer, drafts, .. } = self;
@@ -180,7 +182,7 @@ impl ReplicaWriter {
                 frame
             }
         };
-        writer.progress.skip_to(&writer.segment.ring(), sequence);
+        writer.progress.skip_to(&writer.segment.ring(), sequence, sampled);
         writer.incarnation = record.incarnation;
         writer.publish(frame, record.stamp, record.len_bytes);
         let older = self.begun.iter().flatten().map(|begun| begun.record.sequence).find(|older| *older < sequence);

@@ -37,6 +37,7 @@
 //! against publishing, (G) and (H) holding against reuse.
 
 use crate::step::step;
+use crate::stream::left_out::LeftOut;
 use crate::sync::{AtomicU32, AtomicU64, Ordering, fence};
 use std::cmp;
 
@@ -72,8 +73,12 @@ pub(crate) struct IndexEntry {
     before_ns: AtomicU64,
     epoch: AtomicU64,
     written_ns: AtomicU64,
-    len_bytes: AtomicU64,
-    incarnation: AtomicU64,
+    /// At most the shape's record; of a sequence that was left out: why.
+    pub(super) len_bytes: AtomicU32,
+    incarnation: AtomicU32,
+    /// Sequences before it that were left out since the ring began: records that were lost, and that were sampled out.
+    pub(super) lost: AtomicU64,
+    pub(super) sampled: AtomicU64,
 }
 
 /// A reader's line. Written by that reader; the writer clears what a dead one says of its sleep.
@@ -84,6 +89,8 @@ pub(crate) struct Seat {
     pub(crate) hold: AtomicU32,
     /// Not 0: the reader sleeps, or is about to. Which bell to ring, as the reader chose to write it.
     pub(crate) sleeper: AtomicU64,
+    /// Records that were overwritten before this reader came to them.
+    pub(crate) passed_over: AtomicU64,
 }
 
 /// What is said of a record, besides its sequence.
@@ -94,6 +101,7 @@ pub(crate) struct About {
     pub(crate) written_ns: u64,
     pub(crate) len_bytes: u64,
     pub(crate) incarnation: u32,
+    pub(crate) left_out: LeftOut,
 }
 
 /// An entry as it was read, whole.
@@ -135,8 +143,8 @@ pub(crate) fn word(sequence: u64, frame: Option<usize>) -> u64 {
     sequence << FRAME_BITS | frame.map_or(0, |frame| frame as u64 + 1)
 }
 
-/// How far the word's record is behind (negative) or before the one of this sequence. The word has the sequence's low
-/// 44 bits: at a million records a second two records 200 days apart look the same.
+/// How far the word's record is behind (negative) or before the one of this sequence. The word has its low 44 bits: at
+/// a million records a second two records 200 days apart look the same.
 pub(super) fn ahead(word: u64, sequence: u64) -> i64 {
     ((word >> FRAME_BITS).wrapping_sub(sequence) << FRAME_BITS) as i64 >> FRAME_BITS
 }
@@ -249,28 +257,8 @@ impl<'a> Ring<'a> {
             cmp::Ordering::Equal => {}
             cmp::Ordering::Greater => return Look::Gone,
         }
-        let long = |word: &AtomicU64| word.load(Ordering::Relaxed);
-        let about = About {
-            stamp: Stamp { epoch: long(&entry.epoch), ns: long(&entry.stamp_ns) },
-            before_ns: long(&entry.before_ns),
-            written_ns: long(&entry.written_ns),
-            len_bytes: long(&entry.len_bytes),
-            incarnation: long(&entry.incarnation) as u32,
-        };
-        let line = Line { at, word, sequence, frame: frame - 1, about };
+        let line = Line { at, word, sequence, frame: frame - 1, about: entry.about() };
         if self.is_there(&line) { Look::There(line) } else { Look::Gone }
-    }
-
-    /// What the stream had reached before a sequence that was left out; none: it was not, or a newer one has its place.
-    /// ORDERING: Acquire (B), then (D), as in `look`.
-    pub(crate) fn left_out(&self, sequence: u64) -> Option<Stamp> {
-        let (entry, expected) = (self.entry(sequence), word(sequence, Some(LEFT_OUT)));
-        if entry.word.load(Ordering::Acquire) != expected || self.frames() > LEFT_OUT {
-            return None;
-        }
-        let [epoch, ns] = [&entry.epoch, &entry.before_ns].map(|field| field.load(Ordering::Relaxed));
-        fence(Ordering::Acquire);
-        (entry.word.load(Ordering::Relaxed) == expected).then_some(Stamp { epoch, ns })
     }
 
     /// Whether the record has not been overwritten since it was looked at: what was copied since then is whole.
@@ -361,6 +349,7 @@ impl<'a> Ring<'a> {
     /// Clears what the dead reader before said. For the new owner of a seat.
     pub(crate) fn sit_down(&self, seat: usize) {
         self.awake(seat);
+        self.seats[seat].passed_over.store(0, Ordering::Relaxed);
         step!("seat: awake");
         self.release(seat);
     }
@@ -370,6 +359,20 @@ impl<'a> Ring<'a> {
 pub(super) const TRIES: usize = 8;
 
 impl IndexEntry {
+    /// What is said in it. Look at the word before and after.
+    #[inline]
+    pub(super) fn about(&self) -> About {
+        let long = |word: &AtomicU64| word.load(Ordering::Relaxed);
+        About {
+            stamp: Stamp { epoch: long(&self.epoch), ns: long(&self.stamp_ns) },
+            before_ns: long(&self.before_ns),
+            written_ns: long(&self.written_ns),
+            len_bytes: self.len_bytes.load(Ordering::Relaxed).into(),
+            incarnation: self.incarnation.load(Ordering::Relaxed),
+            left_out: LeftOut { lost: long(&self.lost), sampled: long(&self.sampled) },
+        }
+    }
+
     /// Makes this the entry of a record; the writer alone. The word is the last to be written.
     pub(super) fn write(&self, sequence: u64, frame: usize, about: &About) {
         self.word.store(word(sequence, None), Ordering::Relaxed);
@@ -381,12 +384,14 @@ impl IndexEntry {
             (&self.before_ns, about.before_ns),
             (&self.epoch, about.stamp.epoch),
             (&self.written_ns, about.written_ns),
-            (&self.len_bytes, about.len_bytes),
-            (&self.incarnation, u64::from(about.incarnation)),
+            (&self.lost, about.left_out.lost),
+            (&self.sampled, about.left_out.sampled),
         ];
         for (field, value) in fields {
             field.store(value, Ordering::Relaxed);
         }
+        self.len_bytes.store(about.len_bytes as u32, Ordering::Relaxed);
+        self.incarnation.store(about.incarnation, Ordering::Relaxed);
         step!("entry: filled");
         // ORDERING: Release (A); the entry and the frame are whole. Pairs with (B). SeqCst for (E).
         self.word.store(word(sequence, Some(frame)), Ordering::SeqCst);

@@ -261,7 +261,9 @@ const _: () = {
     assert!(size_of::<WriterSays>() == 64 && offset_of!(WriterSays, refused) == 24);
     assert!(offset_of!(StreamPage, writer) == 64 && offset_of!(StreamPage, written) == 128);
     assert!(size_of::<StreamPage>() <= PAGE);
-    assert!(size_of::<IndexEntry>() == 64 && size_of::<Seat>() == 128 && offset_of!(Seat, sleeper) == 8);
+    assert!(size_of::<IndexEntry>() == 64 && offset_of!(IndexEntry, len_bytes) == 40);
+    assert!(offset_of!(IndexEntry, lost) == 48 && offset_of!(IndexEntry, sampled) == 56);
+    assert!(size_of::<Seat>() == 128 && offset_of!(Seat, sleeper) == 8 && offset_of!(Seat, passed_over) == 16);
 };
 
 #[cfg(test)]

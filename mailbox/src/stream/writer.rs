@@ -9,6 +9,7 @@ use crate::owned::{self, Refused};
 use crate::participant::Participant;
 use crate::step::step;
 use crate::stream::error::{StreamError, WriteError};
+use crate::stream::left_out::LeftOut;
 use crate::stream::record::RecordInfo;
 use crate::stream::ring::{About, Line, Seat, Stamp};
 use crate::stream::segment::StreamSegment;
@@ -198,6 +199,7 @@ impl StreamWriter {
             written_ns: monotonic_ns(),
             len_bytes: len as u64,
             incarnation: self.incarnation,
+            left_out: LeftOut::default(),
         };
         let participant = &self.participant;
         let wake = |seat: &Seat, sleeper| wake(participant, seat, sleeper);

@@ -8,6 +8,7 @@
 //! shared: a successor works it out from the index.
 
 use crate::step::step;
+use crate::stream::left_out::{LeftOut, OmissionCause};
 use crate::stream::ring::{
     About, FRAME, IndexEntry, LEFT_OUT, Look, Ring, SEQUENCE_MAX, STREAM_READERS_MAX, Seat, Stamp, ahead,
 };
@@ -22,6 +23,8 @@ pub(crate) struct Progress {
     free: Vec<u32>,
     /// The greatest stamp of the newest epoch; none before the first record.
     newest: Option<Stamp>,
+    /// Sequences that were left out since the ring began.
+    left_out: LeftOut,
 }
 
 /// A frame to be filled: in no entry and no seat, so the writer alone reaches it. The only one of its frame.
@@ -43,12 +46,17 @@ impl Progress {
         let kept = ring.oldest_before(next)..next;
         let newest = kept.clone().rev().find_map(|sequence| match ring.look(sequence) {
             Look::There(line) => Some(line.reached()),
-            Look::NotYet | Look::Gone => ring.left_out(sequence).filter(|stamp| stamp.ns != 0),
+            Look::NotYet | Look::Gone => {
+                ring.left_out(sequence).map(|omission| omission.reached).filter(|stamp| stamp.ns != 0)
+            }
         });
+        let left_out = kept.clone().rev().find_map(|sequence| ring.left_out_up_to(sequence)).unwrap_or_default();
         if next > counted {
             // Its writer died before it could count it, or among those that it left out before it.
             for sequence in kept.filter(|sequence| ring.entry(*sequence).is_of_older(*sequence)) {
-                leave_out(ring, sequence, newest);
+                // Why, the dead one alone knew.
+                let before = LeftOut { lost: left_out.lost.saturating_sub(next - sequence), ..left_out };
+                leave_out(ring, sequence, newest, (OmissionCause::Lost, before));
             }
             ring.count(next);
             step!("resume: counted");
@@ -63,7 +71,7 @@ impl Progress {
         free.extend((0..ring.frames() as u32).filter(|frame| !used[*frame as usize]));
         // ORDERING (E): what the writer before did to the index, before the looks at the seats. Pairs with (G).
         fence(Ordering::SeqCst);
-        Self { next, free, newest }
+        Self { next, free, newest, left_out }
     }
 
     /// Sequence of the next record.
@@ -98,20 +106,28 @@ impl Progress {
         self.free.push(frame.0);
     }
 
-    /// Leaves out all up to this sequence, which is the next record's: readers are told that they lost them. For a
-    /// replica, where such records never came. A number of steps bounded by what the ring keeps.
-    pub(crate) fn skip_to(&mut self, ring: &Ring<'_>, sequence: u64) {
-        let from = self.next.max(sequence.saturating_sub(ring.keep()));
-        for left_out in from..sequence {
-            self.free.extend(leave_out(ring, left_out, self.newest));
+    /// Leaves out all up to this sequence, which is the next record's: the last `sampled` of them on purpose, the
+    /// others were lost. Readers are told so. For a replica. A number of steps bounded by what the ring keeps.
+    pub(crate) fn skip_to(&mut self, ring: &Ring<'_>, sequence: u64, sampled: u64) {
+        let (next, so_far) = (self.next, self.left_out);
+        let first_sampled = sequence.saturating_sub(sampled).max(next);
+        // What is left out before one of them.
+        let before = |at: u64| LeftOut {
+            lost: so_far.lost.saturating_add(at.min(first_sampled).saturating_sub(next)),
+            sampled: so_far.sampled.saturating_add(at.saturating_sub(first_sampled)),
+        };
+        for at in next.max(sequence.saturating_sub(ring.keep()))..sequence {
+            let cause = if at < first_sampled { OmissionCause::Lost } else { OmissionCause::Sampled };
+            self.free.extend(leave_out(ring, at, self.newest, (cause, before(at))));
         }
-        self.next = self.next.max(sequence);
+        (self.next, self.left_out) = (next.max(sequence), before(sequence));
         // ORDERING (E): the new words before the looks at the seats, when one of these frames is claimed.
         seq_cst_accesses();
     }
 
     /// Makes a filled frame the next record, and calls `wake` for each seat that says that its reader sleeps; `expect`
-    /// before, for the frame that the next record will mostly have. `about.before_ns` is written here.
+    /// before, for the frame that the next record will mostly have. `about.before_ns` and `about.left_out` are written
+    /// here.
     pub(crate) fn publish(
         &mut self,
         ring: &Ring<'_>,
@@ -131,7 +147,7 @@ impl Progress {
         prefetch_to_write(ring.entry(sequence + 1));
         step!("publish: filled");
         hint.store(newest.ns, Ordering::Relaxed);
-        entry.write(sequence, frame.number(), &About { before_ns, ..about });
+        entry.write(sequence, frame.number(), &About { before_ns, left_out: self.left_out, ..about });
         self.next = sequence + 1;
         ring.count(self.next);
         step!("publish: counted");
@@ -163,10 +179,16 @@ fn named_end(ring: &Ring<'_>, counted: u64) -> u64 {
 }
 
 /// Makes this an entry of a record that never came: the frame that it named, of a record that may be more than a turn
-/// of the ring behind. `newest` is what the stream had reached.
-fn leave_out(ring: &Ring<'_>, sequence: u64, newest: Option<Stamp>) -> Option<u32> {
+/// of the ring behind. `newest` is what the stream had reached; then why it never came, and what was left out before.
+fn leave_out(
+    ring: &Ring<'_>,
+    sequence: u64,
+    newest: Option<Stamp>,
+    (cause, left_out): (OmissionCause, LeftOut),
+) -> Option<u32> {
     let stamp = newest.unwrap_or(Stamp { epoch: 0, ns: 0 });
-    let about = About { stamp, before_ns: stamp.ns, written_ns: 0, len_bytes: 0, incarnation: 0 };
+    let len_bytes = IndexEntry::len_of(cause);
+    let about = About { stamp, before_ns: stamp.ns, written_ns: 0, len_bytes, incarnation: 0, left_out };
     let (entry, hint) = ring.place(sequence);
     let old = entry.named_frame(ring.frames());
     hint.store(stamp.ns, Ordering::Relaxed);

@@ -93,9 +93,11 @@ pub(crate) enum Tag {
     Hole,
     /// The module ended as it should.
     End,
+    /// One more answer, behind all others since it is younger: what a reader missed, by cause.
+    Missed,
 }
 
-const ALL: [Tag; 36] = [
+const ALL: [Tag; 37] = [
     Tag::Begin,
     Tag::Event,
     Tag::Time,
@@ -132,6 +134,7 @@ const ALL: [Tag; 36] = [
     Tag::Panicked,
     Tag::Hole,
     Tag::End,
+    Tag::Missed,
 ];
 
 impl Tag {
@@ -178,6 +181,7 @@ impl Tag {
             Self::Panicked => "panics",
             Self::Hole => "does what no journal sees",
             Self::End => "ends",
+            Self::Missed => "asks which records it has missed",
         }
     }
 }

@@ -10,9 +10,9 @@ use super::{MailboxSnapshot, ModuleSurvey, StreamSurvey, Survey, Usage, Working}
 use crate::launcher::ChildState;
 use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{
-    Class, ClassTraffic, FlowInfo, FlowSecond, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, MailboxInfo, ModuleState,
-    Name, OverflowPolicy, ParticipantInfo, Party, Priority, RecordInfo, STREAM_KEEP_MAX, Shape, SlotInfo, Stamp,
-    StreamId, StreamInfo, StreamShape, Type, VictimInfo, WaitingPackage,
+    Class, ClassTraffic, FlowInfo, FlowSecond, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, MailboxInfo, Missed,
+    ModuleState, Name, OverflowPolicy, ParticipantInfo, Party, Priority, RecordInfo, STREAM_KEEP_MAX, Shape, SlotInfo,
+    Stamp, StreamId, StreamInfo, StreamShape, Type, VictimInfo, WaitingPackage,
 };
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -274,7 +274,9 @@ travels! {
         readers: u16,
         holding: u16,
         sleeping: u16,
+        missed: Missed,
     };
+    struct Missed as MissedForm { lost: u64, sampled: u64, passed_over: u64, };
     struct StreamId as StreamIdForm { name: Name, number: u16, };
     struct RecordInfo as RecordForm {
         sequence: u64,

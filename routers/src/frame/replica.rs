@@ -60,6 +60,9 @@ pub struct RecordPart<'a> {
     /// How many sequences it is behind the record that was sent to the same node before; 0: none was, or this part is
     /// sent again.
     pub step: u32,
+    /// Records that the sampling of this replica has left out for this node before the record, since the sending router
+    /// began, modulo 2^32. A sum, so that it stays exact over records that are lost.
+    pub sampled: u32,
     /// Content of the part.
     pub bytes: &'a [u8],
 }
@@ -80,6 +83,7 @@ impl<'a> RecordPart<'a> {
         bytes[44..52].copy_from_slice(&self.written_ns.to_le_bytes());
         bytes[52..56].copy_from_slice(&self.error_ns.to_le_bytes());
         bytes[56..60].copy_from_slice(&self.step.to_le_bytes());
+        bytes[60..64].copy_from_slice(&self.sampled.to_le_bytes());
         bytes
     }
 
@@ -100,6 +104,7 @@ impl<'a> RecordPart<'a> {
             written_ns: long(b, 44),
             error_ns: word(b, 52),
             step: word(b, 56),
+            sampled: word(b, 60),
             bytes,
         };
         let is_some = !bytes.is_empty() || part.len == 0;
@@ -188,6 +193,7 @@ mod tests {
         written_ns: 9,
         error_ns: 10,
         step: 11,
+        sampled: 12,
         bytes: b"part",
     };
     const DESCRIPTION: DescriptionPart<'static> =

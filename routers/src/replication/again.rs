@@ -5,9 +5,20 @@ use rohrpost_mailbox::RecordInfo;
 /// Parts of a record leave again at most as often as it has parts, and so many times more.
 const MORE: usize = 8;
 
+/// A part that is to leave.
+#[derive(Clone, Copy)]
+pub(super) struct AskedPart {
+    pub(super) record: RecordInfo,
+    /// What was sampled out before the record.
+    pub(super) sampled: u32,
+    pub(super) index: usize,
+}
+
 /// Room for one record at a time.
 pub(super) struct Again {
     record: Option<RecordInfo>,
+    /// What was sampled out before it.
+    sampled: u32,
     /// Parts that are to leave, one bit each.
     wanted: Box<[u64]>,
     /// How many.
@@ -19,13 +30,13 @@ pub(super) struct Again {
 impl Again {
     /// Room for a record of so many parts.
     pub(super) fn new(parts: usize) -> Self {
-        Self { record: None, wanted: vec![0; parts.div_ceil(64)].into(), left: 0, budget: 0 }
+        Self { record: None, sampled: 0, wanted: vec![0; parts.div_ceil(64)].into(), left: 0, budget: 0 }
     }
 
-    /// Begins with a record.
-    pub(super) fn begin(&mut self, record: RecordInfo, parts: usize) {
+    /// Begins with a record. `sampled`: what was sampled out before it.
+    pub(super) fn begin(&mut self, record: RecordInfo, sampled: u32, parts: usize) {
         self.clear();
-        (self.record, self.budget) = (Some(record), parts + MORE);
+        (self.record, self.sampled, self.budget) = (Some(record), sampled, parts + MORE);
     }
 
     /// Parts that there is room for: more than a record of the configured size has.
@@ -53,11 +64,12 @@ impl Again {
         *word & bit != 0
     }
 
-    /// The first part that is to leave, and its record.
-    pub(super) fn next(&self) -> Option<(RecordInfo, usize)> {
+    /// The first part that is to leave.
+    pub(super) fn next(&self) -> Option<AskedPart> {
         let record = self.record.filter(|_| self.left > 0)?;
         let at = self.wanted.iter().position(|word| *word != 0)?;
-        Some((record, 64 * at + self.wanted[at].trailing_zeros() as usize))
+        let index = 64 * at + self.wanted[at].trailing_zeros() as usize;
+        Some(AskedPart { record, sampled: self.sampled, index })
     }
 
     /// A part has left.

@@ -1,6 +1,6 @@
 //! A place in a stream: how far one node's replica has come.
 
-use super::again::Again;
+use super::again::{Again, AskedPart};
 use super::counts::{ReplicaLoss, SentReplica};
 use super::fingerprint::{Fingerprint, Fingerprints};
 use crate::frame::{NodeIndex, PartRequest};
@@ -34,8 +34,10 @@ pub(super) struct Destination {
     pub(super) sent: Option<(Fingerprint, u64)>,
     /// Sequence of the record of which all parts left last.
     pub(super) before: Option<u64>,
-    /// Sequences of the records that were begun last, in any order.
-    begun: [Option<u64>; ASKED_MAX],
+    /// Records that were sampled out for it, modulo 2^32.
+    pub(super) sampled: u32,
+    /// The records that were begun last, in any order: each sequence, and what was sampled out before it.
+    begun: [Option<(u64, u32)>; ASKED_MAX],
     /// How many were.
     begins: usize,
     /// What it has asked for: of the record that arrives there, and of the one before.
@@ -61,6 +63,7 @@ impl Destination {
             under_way: None,
             sent: None,
             before: None,
+            sampled: 0,
             begun: [None; ASKED_MAX],
             begins: 0,
             again: std::array::from_fn(|_| Again::new(parts)),
@@ -101,6 +104,7 @@ impl Destination {
             };
             if !is_chosen {
                 lost.add(ReplicaLoss::Sampled, 1);
+                self.sampled = self.sampled.wrapping_add(1);
                 continue;
             }
             let Some(record) = reader.record(sequence) else {
@@ -114,12 +118,13 @@ impl Destination {
                 };
                 if !self.has_none && self.sent.is_some_and(is_sent) {
                     lost.add(ReplicaLoss::Sampled, 1);
+                    self.sampled = self.sampled.wrapping_add(1);
                     continue;
                 }
                 self.sent = Some((fingerprint, now_ns));
             }
             (self.under_way, self.has_none) = (Some((record.info(), 0)), false);
-            self.begun[self.begins % ASKED_MAX] = Some(sequence);
+            self.begun[self.begins % ASKED_MAX] = Some((sequence, self.sampled));
             self.begins = self.begins.wrapping_add(1);
             if let Sampling::Rate(rate_hz) = sampling {
                 self.sample_ns = now_ns.saturating_add((1e9 / rate_hz) as u64);
@@ -153,9 +158,8 @@ impl Destination {
         part_bytes: usize,
     ) -> Result<(), ReplicaLoss> {
         let sequence = request.sequence;
-        if !self.begun.contains(&Some(sequence)) {
-            return Err(ReplicaLoss::NotSent);
-        }
+        let begun = self.begun.iter().flatten().find(|(begun, _)| *begun == sequence);
+        let Some(&(_, sampled)) = begun else { return Err(ReplicaLoss::NotSent) };
         let of = |again: &Again| again.record().map(|record| record.sequence);
         let at = match self.again.iter().position(|again| of(again) == Some(sequence)) {
             Some(at) => at,
@@ -171,7 +175,7 @@ impl Destination {
                     self.sent = None;
                     return Err(ReplicaLoss::Overwritten);
                 };
-                self.again[at].begin(record.info(), parts_of(&record.info(), part_bytes));
+                self.again[at].begin(record.info(), sampled, parts_of(&record.info(), part_bytes));
                 at
             }
         };
@@ -191,9 +195,9 @@ impl Destination {
         Ok(())
     }
 
-    /// The part to send again, and its record: of the older one first.
-    pub(super) fn next_again(&self) -> Option<(RecordInfo, usize)> {
-        self.again.iter().filter_map(Again::next).min_by_key(|(record, _)| record.sequence)
+    /// The part to send again: of the older record first.
+    pub(super) fn next_again(&self) -> Option<AskedPart> {
+        self.again.iter().filter_map(Again::next).min_by_key(|part| part.record.sequence)
     }
 
     /// Whether something is to be sent again.

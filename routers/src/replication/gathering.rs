@@ -40,6 +40,8 @@ pub(super) struct Arriving {
     pub(super) written_ns: u64,
     /// How far off that is at most.
     pub(super) error_ns: u32,
+    /// Records that its sender had sampled out before it, modulo 2^32.
+    pub(super) sampled: u32,
 }
 
 impl Arriving {
@@ -50,7 +52,7 @@ impl Arriving {
             stamp: Stamp { epoch: part.epoch, ns: part.stamp_ns },
             len_bytes: part.len as usize,
         };
-        Self { record, written_ns: part.written_ns, error_ns: part.error_ns }
+        Self { record, written_ns: part.written_ns, error_ns: part.error_ns, sampled: part.sampled }
     }
 
     /// Whether it is this record of the ring here.

@@ -54,6 +54,8 @@ pub(super) struct IncomingReplica {
     writer: Option<ReplicaWriter>,
     /// Of the newest record; none: it was written before this router began.
     life: Option<Life>,
+    /// What its sender had sampled out before it, in that life, modulo 2^32; none: not known.
+    sampled: Option<u32>,
     open: [Gathering; 2],
     /// The newest record that was given up: what still comes of it, or of older ones, is late.
     given_up: Option<(Life, u64)>,
@@ -83,6 +85,7 @@ impl IncomingReplica {
             announced: None,
             writer: None,
             life: None,
+            sampled: None,
             open: std::array::from_fn(|_| Gathering::new(replica, part_bytes)),
             given_up: None,
             whole_ns: 0,
@@ -183,7 +186,7 @@ impl IncomingReplica {
         };
         if record.sequence < next {
             if newest.is_some_and(|newest| arriving.is(&newest)) {
-                self.life = Some(life);
+                (self.life, self.sampled) = (Some(life), Some(arriving.sampled));
                 self.lose(ReplicaLoss::Duplicate);
                 return None;
             }
@@ -341,7 +344,9 @@ impl IncomingReplica {
         let (Some(arriving), Some(writer)) = (open.arriving, &mut self.writer) else { return open.close() };
         let (record, next) = (arriving.record, writer.next());
         open.close();
-        if let Err(why) = writer.finish(record.sequence) {
+        let before = self.sampled.filter(|_| self.life == Some(open.life));
+        let sampled = before.map_or(0, |before| arriving.sampled.wrapping_sub(before));
+        if let Err(why) = writer.finish(record.sequence, sampled.into()) {
             self.tell(&why.to_string());
             return self.lose(ReplicaLoss::Unwritable);
         }
@@ -350,7 +355,7 @@ impl IncomingReplica {
         counts.records.add(1);
         counts.bytes.add(record.len_bytes as u64);
         counts.completed.add(open.was_asked().into());
-        self.life = Some(open.life);
+        (self.life, self.sampled) = (Some(open.life), Some(arriving.sampled));
         self.delays.note(now.ns, &(now.system)(), &arriving, (&self.settings, counts));
     }
 

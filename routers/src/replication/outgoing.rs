@@ -195,7 +195,8 @@ impl OutgoingReplica {
         let (place, generation, description) = (self.place, self.generation, self.description.check());
         let destination = &mut self.destinations[to];
         let again = destination.next_again();
-        let (info, offset) = again.map(|(info, index)| (info, index * part_bytes)).or(destination.under_way)?;
+        let asked = again.map(|part| (part.record, part.index * part_bytes));
+        let (info, offset) = asked.or(destination.under_way)?;
         let record = self.reader.as_mut().and_then(|reader| reader.record(info.sequence));
         let Some(record) = record.filter(|record| record.info() == info) else {
             destination.is_overwritten(again.map(|_| info.sequence));
@@ -218,6 +219,8 @@ impl OutgoingReplica {
             written_ns: if is_comparable { written.ns } else { 0 },
             error_ns: u32::try_from(written.error.as_nanos()).unwrap_or(u32::MAX),
             step: step.and_then(|step| u32::try_from(step).ok()).unwrap_or(0),
+            // Nothing is chosen, so nothing left out, while a record is under way.
+            sampled: again.map_or(destination.sampled, |part| part.sampled),
             bytes: &record.body()[offset..end],
         };
         let bytes = RECORD_PART_HEAD_BYTES + part.bytes.len();

@@ -20,7 +20,7 @@ use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{
-    Head, Name, Next, Node, Participant, Stamp, StreamId, StreamReader, StreamShape, StreamWriter, SystemTime,
+    Head, Missed, Name, Next, Node, Participant, Stamp, StreamId, StreamReader, StreamShape, StreamWriter, SystemTime,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -258,7 +258,7 @@ fn records_arrive_as_they_were_written() {
     let replicas = [image()];
     let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
     let (mut now_ns, mut writer, mut reader) = (START, origin.writer(ID, SHAPE), holder.reader());
-    for (sequence, len) in (0..).zip([0, 1, 1376, 1377, 6000, 17]) {
+    for (sequence, len) in (0..).zip([0, 1, 1372, 1373, 6000, 17]) {
         let body: Vec<u8> = (0..len).map(|at| (at * 7 + sequence as usize) as u8).collect();
         writer.write(at(100 + sequence), &body).unwrap();
         holder.take_all(now_ns, &origin.leave(&mut now_ns));
@@ -349,6 +349,7 @@ fn sampling_leaves_out_what_it_says() {
         assert_eq!(all.iter().map(|(sequence, _)| *sequence).collect::<Vec<_>>(), expected, "{sampling}");
         let told: u64 = expected.last().unwrap() + 1 - expected.len() as u64;
         assert_eq!((lost, origin.lost(ReplicaLoss::Sampled)), (told, left_out), "{sampling}");
+        assert_eq!(reader.missed(), Missed { lost: 0, sampled: told, passed_over: 0 }, "{sampling}");
     }
 }
 
@@ -374,4 +375,6 @@ fn a_wire_that_is_too_slow_carries_the_newest() {
     assert_eq!(all.len() as u64 + lost, 100, "each is read or told");
     assert!(origin.lost(ReplicaLoss::Passed) >= 60, "{}", origin.lost(ReplicaLoss::Passed));
     assert_eq!(holder.records() + holder.counts().gaps.get(), 100);
+    let passed_over = holder.records() - all.len() as u64;
+    assert_eq!(reader.missed(), Missed { lost: 100 - holder.records(), sampled: 0, passed_over });
 }

@@ -17,8 +17,8 @@ use rohrpost::survey::{ModuleSurvey, StreamSurvey, Survey, Usage, sum};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{
-    Class, ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, ModuleState, OverflowPolicy, ParticipantInfo, Shape,
-    StreamId, StreamInfo, StreamShape, Type, local,
+    Class, ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, Missed, ModuleState, OverflowPolicy, ParticipantInfo,
+    Shape, StreamId, StreamInfo, StreamShape, Type, local,
 };
 use std::path::Path;
 use std::time::Duration;
@@ -258,6 +258,7 @@ fn stream(at_ns: u64, name: Name) -> StreamSurvey {
         readers: 2,
         holding: 0,
         sleeping: 1,
+        missed: Missed::default(),
     };
     StreamSurvey { node: "main".into(), at_ns, info }
 }

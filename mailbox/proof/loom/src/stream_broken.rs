@@ -14,6 +14,7 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_successor_goes_round_what_is_held", 3),
     ("no_half_record_is_left", 3),
     ("the_writer_goes_round_what_is_held_and_left_out", 3),
+    ("what_was_left_out_is_told_by_cause", 2),
     ("a_successor_leaves_out_the_rest", 2),
     ("a_dead_holder_costs_nothing", 2),
     ("no_wake_up_is_lost", 3),
@@ -28,6 +29,7 @@ const RACE: &str = "Causality violation";
 /// The reader sleeps for ever: nobody will ring.
 const ENDLESS: &str = "maximum number of branches";
 const LOST: &str = "a finished record is lost, or an unfinished one is none";
+const CAUSE: &str = "a cause is wrong";
 const NO_FRAME: &str = "there always is a free frame";
 
 const fn edit(file: &'static str, from: &'static str, to: &'static str) -> Edit {
@@ -40,6 +42,10 @@ const fn ring(from: &'static str, to: &'static str) -> Edit {
 
 const fn writing(from: &'static str, to: &'static str) -> Edit {
     edit("stream/writing", from, to)
+}
+
+const fn left_out(from: &'static str, to: &'static str) -> Edit {
+    edit("stream/left_out", from, to)
 }
 
 const fn broken(name: &'static str, edits: &'static [Edit], caught_by: &'static str, says: &'static str) -> Broken {
@@ -113,8 +119,8 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "stream_resume_without_fence_e",
         &[writing(
-            "        fence(Ordering::SeqCst);\n        Self { next, free, newest }",
-            "Self { next, free, newest }",
+            "        fence(Ordering::SeqCst);\n        Self { next, free, newest, left_out }",
+            "Self { next, free, newest, left_out }",
         )],
         "a_successor_goes_round_what_is_held",
         RACE,
@@ -199,7 +205,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     ),
     broken(
         "stream_resume_leaves_half_left_out",
-        &[writing("                leave_out(ring, sequence, newest);\n", "                let _ = sequence;\n")],
+        &[writing("leave_out(ring, sequence, newest, (OmissionCause::Lost, before));", "let _ = (sequence, before);")],
         "a_successor_leaves_out_the_rest",
         "a reader waits for what was left out",
     ),
@@ -214,9 +220,37 @@ pub(crate) const BROKEN: &[Broken] = &[
     ),
     broken(
         "stream_leaves_out_and_frees_at_once",
-        &[writing("leave_out(ring, left_out, self.newest)", "ring.entry(left_out).named_frame(ring.frames())")],
+        &[writing(
+            "leave_out(ring, at, self.newest, (cause, before(at)))",
+            "ring.entry(at).named_frame(ring.frames())",
+        )],
         "the_writer_goes_round_what_is_held_and_left_out",
         TORN,
+    ),
+    // ---- what was left out ----
+    broken(
+        "stream_left_out_looks_once",
+        &[left_out("(entry.word.load(Ordering::Relaxed) == expected).then_some(omission)", "Some(omission)")],
+        "what_was_left_out_is_told_by_cause",
+        CAUSE,
+    ),
+    broken(
+        "stream_left_out_without_fence_d",
+        &[left_out("let about = entry.about();\n        fence(Ordering::Acquire);", "let about = entry.about();")],
+        "what_was_left_out_is_told_by_cause",
+        CAUSE,
+    ),
+    broken(
+        "stream_left_out_without_acquire_b",
+        &[left_out("entry.word.load(Ordering::Acquire) != expected", "entry.word.load(Ordering::Relaxed) != expected")],
+        "what_was_left_out_is_told_by_cause",
+        CAUSE,
+    ),
+    broken(
+        "stream_all_that_was_left_out_is_lost",
+        &[writing("if at < first_sampled {", "if at < sequence {")],
+        "what_was_left_out_is_told_by_cause",
+        CAUSE,
     ),
     // ---- sleep ----
     broken(

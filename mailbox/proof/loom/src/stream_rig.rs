@@ -2,6 +2,8 @@
 //! the models.
 
 use crate::step::reached;
+use crate::stream::left_out::LeftOut;
+use crate::stream::missed::{Missed, MissedAccount};
 use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};
 use crate::stream::writing::Progress;
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
@@ -68,7 +70,8 @@ impl Stream {
             Bytes::Plain => self.plain[frame.number()].with_mut(|plain| unsafe { *plain = sequence + 1 }),
         }
         let stamp = Stamp { epoch: 1, ns: stamp_ns };
-        let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: sequence + 1, incarnation: 0 };
+        let left_out = LeftOut::default();
+        let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: sequence + 1, incarnation: 0, left_out };
         let wake = |_: &Seat, _| {
             self.rings.fetch_add(1, Ordering::Release);
         };
@@ -114,11 +117,15 @@ pub(crate) struct Reader {
     pub(crate) next: u64,
     pub(crate) read: u64,
     pub(crate) lost: u64,
+    pub(crate) missed: MissedAccount,
 }
 
 impl Reader {
     pub(crate) fn new(stream: &Arc<Stream>, seat: usize) -> Self {
-        Self { stream: stream.clone(), seat, next: 0, read: 0, lost: 0 }
+        let mut reader =
+            Self { stream: stream.clone(), seat, next: 0, read: 0, lost: 0, missed: MissedAccount::default() };
+        reader.missed.begin(&stream.ring(), 0);
+        reader
     }
 
     /// As `StreamReader::advance`; false when there is nothing.
@@ -130,9 +137,10 @@ impl Reader {
                 assert_eq!(line.sequence, self.next);
                 self.next += 1;
                 self.read += 1;
+                self.missed.come_to(line.about.left_out);
             }
             Look::There(_) | Look::Gone => {
-                let oldest = ring.oldest_after(self.next);
+                let oldest = self.missed.miss(&ring, self.seat, self.next);
                 assert!(oldest > self.next, "overwritten, and not told so");
                 self.lost += oldest - self.next;
                 self.next = oldest;
@@ -147,9 +155,16 @@ impl Reader {
     }
 
     /// Everything that was written was read or lost.
-    pub(crate) fn settle(mut self, written: u64, bytes: Bytes) {
+    pub(crate) fn settle(self, written: u64, bytes: Bytes) {
+        self.account(written, bytes);
+    }
+
+    /// The same, and what was missed by cause.
+    pub(crate) fn account(mut self, written: u64, bytes: Bytes) -> Missed {
         self.catch_up(bytes);
         assert_eq!((self.read + self.lost, self.next), (written, written), "the accounts are wrong");
+        assert_eq!(self.missed.missed().all(), self.lost, "some were missed without a cause");
+        self.missed.missed()
     }
 }
 

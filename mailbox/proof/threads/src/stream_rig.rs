@@ -6,6 +6,7 @@
 
 use crate::rounds;
 use crate::step::{dice, reached, shake};
+use crate::stream::left_out::LeftOut;
 use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};
 use crate::stream::writing::Progress;
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
@@ -69,7 +70,8 @@ impl Stream {
             return progress.give_back(frame);
         }
         let stamp = Stamp { epoch: 1, ns: number + 1 };
-        let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: 32, incarnation: 1 };
+        let about =
+            About { stamp, before_ns: 0, written_ns: 0, len_bytes: 32, incarnation: 1, left_out: LeftOut::default() };
         progress.publish(&ring, frame, about, |_| (), |_, _| ());
     }
 

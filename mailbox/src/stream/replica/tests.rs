@@ -3,6 +3,7 @@
 use super::*;
 use crate::node::Node;
 use crate::stream::error::WriteError;
+use crate::stream::missed::Missed;
 use crate::stream::reader::StreamReader;
 use crate::stream::record::{Around, Next};
 
@@ -18,11 +19,16 @@ fn ground() -> (tempfile::TempDir, Arc<Participant>, StreamId) {
 }
 
 fn write(replica: &mut ReplicaWriter, sequence: u64) -> Result<(), ReplicaError> {
+    write_behind(replica, sequence, 0)
+}
+
+/// The last `sampled` before it were left out on purpose.
+fn write_behind(replica: &mut ReplicaWriter, sequence: u64, sampled: u64) -> Result<(), ReplicaError> {
     let bytes = sequence.to_le_bytes();
     let stamp = Stamp { epoch: 1, ns: 100 + sequence };
     replica.begin(OriginRecord { sequence, incarnation: 7, stamp, len_bytes: bytes.len() })?;
     assert!(replica.put(sequence, 4, &bytes[4..]) && replica.put(sequence, 0, &bytes[..4]));
-    replica.finish(sequence)
+    replica.finish(sequence, sampled)
 }
 
 /// Sequences that are read, and how many are told as lost, until there is nothing.
@@ -67,6 +73,80 @@ fn each_sequence_is_read_or_told_as_lost() {
     }
 }
 
+/// Whatever is left out, for which cause and in how large a ring: a reader knows exactly how many there were of each,
+/// at whatever time it reads, and which records it was too slow for.
+#[test]
+fn each_that_is_not_read_is_told_with_its_cause() {
+    for seed in 0..200_u64 {
+        let mut random = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        let mut below = |most: u64| {
+            // As xorshift does.
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            random % most
+        };
+        let (_folder, participant, id) = ground();
+        let shape = StreamShape { keep: [2, 4, 16][seed as usize % 3], ..SHAPE };
+        let first = below(50);
+        let mut replica = participant.replica_writer(id, shape, first).unwrap();
+        let mut reader = participant.stream_reader(id).unwrap();
+        let (mut left_out, mut written, mut since) = (Missed::default(), 0, 0);
+        for _ in 0..60 {
+            let [lost, sampled] = [below(3) * below(6), below(3) * below(6)];
+            let sequence = replica.next() + lost + sampled;
+            write_behind(&mut replica, sequence, sampled).unwrap();
+            (left_out.lost, left_out.sampled, written) =
+                (left_out.lost + lost, left_out.sampled + sampled, written + 1);
+            let info = participant.node().inspect_stream(id).unwrap().unwrap();
+            assert_eq!(Missed { passed_over: 0, ..info.missed }, left_out, "seed {seed}: the ring says so");
+            if below(3) > 0 {
+                continue;
+            }
+            let before = reader.missed();
+            let (all, told) = read(&mut reader);
+            assert_eq!(reader.missed().since(&before).all(), told, "seed {seed}: what is told has a cause at once");
+            since += all.len() as u64;
+            let passed_over = written - since;
+            assert_eq!(reader.missed(), Missed { passed_over, ..left_out }, "seed {seed}");
+            let info = participant.node().inspect_stream(id).unwrap().unwrap();
+            assert_eq!(info.missed.passed_over, passed_over, "seed {seed}: its seat says so");
+            if below(8) == 0 {
+                // Its next life goes on with the counts.
+                drop(replica);
+                replica = participant.replica_writer(id, shape, sequence + 1).unwrap();
+            }
+        }
+        let mut later = participant.stream_reader(id).unwrap();
+        let next = replica.next() + 40;
+        write_behind(&mut replica, next, 30).unwrap();
+        assert_eq!(
+            (read(&mut later), later.missed()),
+            ((vec![next], 40), Missed { lost: 10, sampled: 30, passed_over: 0 })
+        );
+        later.seek(first);
+        let (there, told) = read(&mut later);
+        assert_eq!(there.len() as u64 + told, next + 1 - first, "seed {seed}");
+        let left_out = Missed { lost: left_out.lost + 10, sampled: left_out.sampled + 30, passed_over: 0 };
+        let again = later.missed().since(&Missed { lost: 10, sampled: 30, passed_over: 0 });
+        assert_eq!(Missed { passed_over: 0, ..again }, left_out, "seed {seed}: from the first one on all is known");
+    }
+}
+
+/// More is claimed to be left out on purpose than is left out at all.
+#[test]
+fn a_gap_has_no_more_than_its_length_of_either_cause() {
+    let (_folder, participant, id) = ground();
+    let mut replica = participant.replica_writer(id, SHAPE, 0).unwrap();
+    let mut reader = participant.stream_reader(id).unwrap();
+    for (sequence, claimed) in [(0, u64::MAX), (3, u64::MAX), (4, 9), (40, 1 << 40)] {
+        write_behind(&mut replica, sequence, claimed).unwrap();
+    }
+    let (all, told) = read(&mut reader);
+    let passed_over = 4 - all.len() as u64;
+    assert_eq!((told, reader.missed()), (37 + passed_over, Missed { lost: 0, sampled: 37, passed_over }));
+}
+
 fn begin(replica: &mut ReplicaWriter, sequence: u64, ns: u64) -> Result<(), ReplicaError> {
     replica.begin(OriginRecord { sequence, incarnation: 7, stamp: Stamp { epoch: 1, ns }, len_bytes: 8 })
 }
@@ -90,10 +170,10 @@ fn two_records_are_filled_at_once_and_finished_in_order() {
             }
             assert!(matches!(reader.try_next().unwrap(), Next::Nothing), "nobody sees what is not finished");
             if older % 2 == 0 {
-                replica.finish(older).unwrap();
+                replica.finish(older, 0).unwrap();
             }
-            replica.finish(newer).unwrap();
-            assert!(replica.begun(older).is_none() && replica.finish(older).is_err(), "a sequence does not go back");
+            replica.finish(newer, 0).unwrap();
+            assert!(replica.begun(older).is_none() && replica.finish(older, 0).is_err(), "a sequence does not go back");
             let (all, lost) = read(&mut reader);
             let before = u64::from(older > 0);
             let expected = if older % 2 == 0 { (vec![older, newer], before) } else { (vec![newer], before + 1) };
@@ -109,8 +189,8 @@ fn a_stamp_behind_what_was_finished_meanwhile_is_refused() {
         let mut replica = participant.replica_writer(id, shape, 0).unwrap();
         begin(&mut replica, 0, 100).unwrap();
         begin(&mut replica, 1, 99).unwrap();
-        replica.finish(0).unwrap();
-        assert!(matches!(replica.finish(1), Err(ReplicaError::Write(WriteError::Late { .. }))));
+        replica.finish(0, 0).unwrap();
+        assert!(matches!(replica.finish(1, 0), Err(ReplicaError::Write(WriteError::Late { .. }))));
         assert_eq!((replica.next(), replica.begun(1)), (1, None));
     }
 }
@@ -134,7 +214,7 @@ fn a_frame_that_no_reader_holds_is_there_for_one_record_always() {
     begin(&mut replica, 11, 111).unwrap();
     for sequence in [10, 11_u64] {
         assert!(replica.put(sequence, 0, &sequence.to_le_bytes()));
-        replica.finish(sequence).unwrap();
+        replica.finish(sequence, 0).unwrap();
     }
 }
 
@@ -197,7 +277,7 @@ fn what_does_not_fit_is_not_written() {
     let stamp = Stamp { epoch: 1, ns: 1 };
     let record = OriginRecord { sequence: 0, incarnation: 1, stamp, len_bytes: 65 };
     assert!(matches!(replica.begin(record), Err(ReplicaError::Write(WriteError::TooLarge { .. }))));
-    assert!(!replica.put(0, 0, b"a") && replica.finish(0).is_err());
+    assert!(!replica.put(0, 0, b"a") && replica.finish(0, 0).is_err());
     replica.begin(OriginRecord { len_bytes: 8, ..record }).unwrap();
     for (offset, bytes) in [(8, &b"a"[..]), (1, b"12345678"), (usize::MAX, b"ab")] {
         assert!(!replica.put(0, offset, bytes), "{offset}");

@@ -8,7 +8,7 @@ use crate::fusion::{Interpolate, NoValue, Share, Stamp};
 use crate::journal::{Question, Tag, nanoseconds};
 use crate::runtime::clock::ModuleClock;
 use crate::runtime::unreadable::Unreadable;
-use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo};
+use rohrpost_mailbox::{Around, HeldRecord, Missed, Next, RecordInfo};
 use rohrpost_schema::{Data, View};
 use std::marker::PhantomData;
 use std::time::Duration;
@@ -96,7 +96,7 @@ impl<T: Data> Stream<T> {
     ///     loop {
     ///         match heights.try_next()? {
     ///             Next::Record(record) => println!("{} at {}", record.read()?, record.stamp_ns()),
-    ///             Next::Lost(lost) => println!("{lost} were overwritten before this module came to them"),
+    ///             Next::Lost(lost) => println!("{lost} are missed; `heights.missed()` tells why"),
     ///             Next::Nothing => return Ok(()),
     ///         }
     ///     }
@@ -191,6 +191,25 @@ impl<T: Data> Stream<T> {
     /// Records read by [`Stream::try_next`], and records lost on the way.
     pub fn accounts(&self) -> (u64, u64) {
         self.clock.journal().answer(Tag::Accounts, self.asked(), || self.reader.reader.accounts())
+    }
+
+    /// Those lost on the way by cause, in records; what [`Next::Lost`] has just told is among them.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::Stream;
+    /// fn is_too_slow(heights: &Stream<f64>) -> bool {
+    ///     let missed = heights.missed();
+    ///     // The network, and what the configuration leaves out, are not this module's doing.
+    ///     missed.passed_over > missed.lost + missed.sampled
+    /// }
+    /// ```
+    pub fn missed(&self) -> Missed {
+        let ask = || {
+            let Missed { lost, sampled, passed_over } = self.reader.reader.missed();
+            (lost, sampled, passed_over)
+        };
+        let (lost, sampled, passed_over) = self.clock.journal().answer(Tag::Missed, self.asked(), ask);
+        Missed { lost, sampled, passed_over }
     }
 
     /// The two records around a time, or exactly why not. [`Stream::record`] reads each.

@@ -98,6 +98,7 @@ fn seen() -> Snapshot {
         readers: 4,
         holding: 1,
         sleeping: 3,
+        missed: Missed { lost: 7, sampled: 8, passed_over: 9 },
     };
     Snapshot::Survey(Box::new(Survey {
         node: "base".into(),

@@ -23,6 +23,7 @@ fn part(bytes: &[u8]) -> RecordPart<'_> {
         written_ns: 0,
         error_ns: 0,
         step: 0,
+        sampled: 0,
         bytes,
     }
 }
@@ -49,7 +50,7 @@ fn described_by(replica: ReplicaSettings) -> Holder {
 fn what_does_not_belong_here_is_refused_and_counted() {
     let mut holder = described();
     assert!(!take(&mut holder, ORIGIN, RecordPart { place: 1, ..part(b"picture") }), "there is no such replica");
-    let large = [0; 1376];
+    let large = [0; 1372];
     let cases: [(NodeIndex, RecordPart<'_>, ReplicaLoss); 8] = [
         (2, part(b"picture"), ReplicaLoss::Foreign),
         (ORIGIN, RecordPart { description: 1, ..part(b"picture") }, ReplicaLoss::Undescribed),
@@ -77,7 +78,7 @@ fn what_does_not_belong_here_is_refused_and_counted() {
 fn a_record_of_which_a_part_never_comes_is_left_out() {
     let mut holder = described_by(ReplicaSettings { deadline_ns: 0, ..image() });
     let mut reader = holder.reader();
-    let bytes = [4; 1376];
+    let bytes = [4; 1372];
     let first = |sequence| RecordPart { len: 2000, sequence, ..part(&bytes) };
     assert!(take(&mut holder, ORIGIN, RecordPart { sequence: 4, ..part(b"whole") }));
     assert!(take(&mut holder, ORIGIN, first(5)));
@@ -93,12 +94,12 @@ fn no_part_does_harm() {
     let mut holder = described();
     let mut reader = holder.reader();
     let mut rng = ChaCha8Rng::seed_from_u64(22);
-    let bytes = [9; 1376];
+    let bytes = [9; 1372];
     for _ in 0..5000 {
         let one_of = |rng: &mut ChaCha8Rng, all: &[u32]| all[rng.random_range(0..all.len())];
-        let len = one_of(&mut rng, &[0, 1, 1376, 1377, 3000, 6000, 6001, u32::MAX]);
-        let offset = one_of(&mut rng, &[0, 0, 1, 1376, 2752, 5504, u32::MAX]);
-        let room = if rng.random_bool(0.9) { len.saturating_sub(offset).min(1376) } else { one_of(&mut rng, &[0, 7]) };
+        let len = one_of(&mut rng, &[0, 1, 1372, 1373, 3000, 6000, 6001, u32::MAX]);
+        let offset = one_of(&mut rng, &[0, 0, 1, 1372, 2744, 5488, u32::MAX]);
+        let room = if rng.random_bool(0.9) { len.saturating_sub(offset).min(1372) } else { one_of(&mut rng, &[0, 7]) };
         let part = RecordPart {
             place: rng.random_range(0..2),
             generation: one_of(&mut rng, &[0, 0, 0, 1, 0x8000]) as u16,
@@ -109,6 +110,7 @@ fn no_part_does_harm() {
             stamp_ns: if rng.random_bool(0.9) { 100 } else { rng.random_range(0..200) },
             epoch: one_of(&mut rng, &[1, 1, 1, 2]).into(),
             step: one_of(&mut rng, &[0, 1, 1, 3, u32::MAX]),
+            sampled: one_of(&mut rng, &[0, 0, 1, 7, u32::MAX]),
             bytes: &bytes[..room as usize],
             ..part(b"")
         };

@@ -39,7 +39,7 @@ fn parts_that_are_asked_for_leave_before_new_ones() {
     let (mut origin, mut writer, mut now_ns) = sent(image(), 2);
     writer.write(at(200), &[9; 6000]).unwrap();
     assert!(ask(&mut origin, HOLDER, request(1, &[4])) && ask(&mut origin, HOLDER, request(0, &[1, 3])));
-    let sequence = |datagram: &[u8]| (datagram[56], u32::from_le_bytes(*datagram[52..].first_chunk().unwrap()) / 1376);
+    let sequence = |datagram: &[u8]| (datagram[56], u32::from_le_bytes(*datagram[52..].first_chunk().unwrap()) / 1372);
     let left: Vec<(u8, u32)> = origin.leave(&mut now_ns).iter().map(|datagram| sequence(datagram)).collect();
     assert_eq!(left, [(0, 1), (0, 3), (1, 4), (2, 0), (2, 1), (2, 2), (2, 3), (2, 4)]);
     assert_eq!(again(&origin), 3);
@@ -149,7 +149,7 @@ fn of_a_record_larger_than_its_replica_no_part_is_sent_again_for_which_there_is_
     let mut origin = Origin::new(&[image()]);
     let (mut writer, mut now_ns) = (origin.writer(ID, shape), START);
     writer.write(at(100), &[7; 200_000]).unwrap();
-    assert!(origin.leave(&mut now_ns).len() >= 200_000_usize.div_ceil(1376), "the description, and all parts");
+    assert!(origin.leave(&mut now_ns).len() >= 200_000_usize.div_ceil(1372), "the description, and all parts");
     assert!(ask(&mut origin, HOLDER, request(0, &[1, 100])));
     assert!(origin.leave(&mut now_ns).is_empty());
     assert_eq!((origin.lost(ReplicaLoss::OutOfRange), again(&origin)), (1, 0));

@@ -252,9 +252,9 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "half_of_what_is_left_out_stays",
         edits: &[edit(
             "stream/writing",
-            "                leave_out(ring, sequence, newest);",
+            "                leave_out(ring, sequence, newest, (OmissionCause::Lost, before));",
             "                if !broken!(half_of_what_is_left_out_stays) {
-                    leave_out(ring, sequence, newest);
+                    leave_out(ring, sequence, newest, (OmissionCause::Lost, before));
                 }",
         )],
         scene: "streams::a_writer_of_a_replica_dies_leaving_records_out",

@@ -142,6 +142,16 @@ pub(crate) const RECORDS: Group = Group {
             )],
         },
         Planted {
+            name: "SaysSampled",
+            text: "Replication: a record more is said to be left out on purpose before each.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/incoming.rs",
+                "writer.finish(record.sequence, sampled.into())",
+                "writer.finish(record.sequence, u64::from(sampled) + u64::from(broken!(SaysSampled)))",
+            )],
+        },
+        Planted {
             name: "CountsRecordsTwice",
             text: "Replication: a record of two parts or more is counted as sent with each.",
             shows_in: IN_NETWORKS,

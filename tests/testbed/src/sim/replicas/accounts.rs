@@ -1,6 +1,7 @@
 //! Whether what routers count of replicas adds up: on the node that writes, on those that read, and between them.
 
-use super::Rings;
+use super::books::body;
+use super::rings::Rings;
 use crate::sim::promise::Promise;
 use crate::sim::spans::{MS, S};
 use crate::sim::station::Io;
@@ -9,29 +10,26 @@ use rohrpost_mailbox::StreamInfo;
 use rohrpost_routers::replication::{ReceivedReplica, ReplicaLoss, SentReplica};
 use std::sync::Arc;
 
-/// Records that may be on their way, or that are taken for others, at a moment.
-const ON_THE_WAY: u64 = 64;
-
 /// What one incarnation of a router counts.
 pub(super) struct Accounts {
-    sent: Vec<Sent>,
-    received: Vec<Received>,
+    sent: Vec<SentAccount>,
+    received: Vec<ReceivedAccount>,
 }
 
-struct Sent {
+struct SentAccount {
     counts: Arc<SentReplica>,
     /// Since all is well: records that were written, and what became of them.
-    well: Option<(u64, Sums)>,
+    well: Option<(u64, RecordSums)>,
 }
 
 /// What became of records at their origin.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sums {
+pub(super) struct RecordSums {
     pub(super) sent: u64,
     pub(super) not_sent: u64,
 }
 
-struct Received {
+struct ReceivedAccount {
     counts: Arc<ReceivedReplica>,
     /// With which sequence the replica began for this router, and how often it has begun anew since.
     first: Option<(u64, u32)>,
@@ -39,7 +37,7 @@ struct Received {
     well: Option<u64>,
 }
 
-impl Sums {
+impl RecordSums {
     pub(super) fn of(counts: &SentReplica) -> Self {
         let causes = [ReplicaLoss::Sampled, ReplicaLoss::Passed, ReplicaLoss::Absent];
         let not_sent = causes.into_iter().map(|cause| counts.lost.of(cause)).sum();
@@ -49,8 +47,8 @@ impl Sums {
 
 impl Accounts {
     pub(super) fn new(sent: Vec<Arc<SentReplica>>, received: Vec<Arc<ReceivedReplica>>) -> Self {
-        let sent = sent.into_iter().map(|counts| Sent { counts, well: None }).collect();
-        let received = received.into_iter().map(|counts| Received { counts, first: None, well: None }).collect();
+        let sent = sent.into_iter().map(|counts| SentAccount { counts, well: None }).collect();
+        let received = received.into_iter().map(|counts| ReceivedAccount { counts, first: None, well: None }).collect();
         Self { sent, received }
     }
 
@@ -78,19 +76,19 @@ impl Accounts {
     }
 }
 
-impl Sent {
+impl SentAccount {
     fn check(&mut self, io: &mut Io<'_>, well: bool) {
         let written = io.oracle.records.streams[usize::from(self.counts.place)].count;
-        let now = (written, Sums::of(&self.counts));
+        let now = (written, RecordSums::of(&self.counts));
         self.well = if well { self.well.or(Some(now)) } else { None };
     }
 
-    /// Nothing is under way any more: each record was sent, or is counted with a cause. No record is both, see
-    /// [`Leaving`](super::leaving::Leaving).
+    /// Nothing is under way any more: each record was sent, or is counted with a cause. No record is both: that is
+    /// seen where it leaves.
     fn close(&self, io: &mut Io<'_>) {
         let Some((written_before, before)) = self.well else { return };
         let place = usize::from(self.counts.place);
-        let (written, now) = (io.oracle.records.streams[place].count, Sums::of(&self.counts));
+        let (written, now) = (io.oracle.records.streams[place].count, RecordSums::of(&self.counts));
         let (more, accounted) = (written - written_before, now.sent + now.not_sent - before.sent - before.not_sent);
         if accounted < more {
             let text = format!(
@@ -104,7 +102,7 @@ impl Sent {
     }
 }
 
-impl Received {
+impl ReceivedAccount {
     fn ring(&self, io: &Io<'_>, rings: &Rings) -> Option<StreamInfo> {
         let id = io.plan.streams[usize::from(self.counts.place)].id;
         rings.node(io.node).inspect_stream(id).ok().flatten()
@@ -155,7 +153,7 @@ impl Received {
         let is_there = match its.sampling {
             _ if came.generation != newest.generation => false,
             _ if there.sequence == sequence => true,
-            Sampling::Each => its.changed && (came.start, came.len) == (newest.start, newest.len),
+            Sampling::Each => its.changed && body(came.start, came.len) == body(newest.start, newest.len),
             // Of these not all differ from the one before.
             Sampling::Every(every) => its.changed || there.sequence + u64::from(every) > sequence,
             Sampling::Rate(rate_hz) => {
@@ -164,21 +162,5 @@ impl Received {
             }
         };
         if is_there { Ok(()) } else { Err(format!("{sequence} was written last, {newest:?}, and {there:?} came last")) }
-    }
-}
-
-impl super::super::world::World<'_> {
-    /// What one end counts as sent the other counts as come.
-    pub(in crate::sim) fn close_records(&mut self) {
-        let now = self.now(0);
-        let books = &self.oracle.records;
-        let both = |(key, sent): (&(u16, u8), &u64)| Some((*key, *sent, *books.came.get(key)?));
-        let wrong: Vec<_> = books.sent.iter().filter_map(both).collect();
-        for ((place, to), sent, came) in wrong {
-            if came < sent || came > sent + ON_THE_WAY {
-                let text = format!("{sent} records of stream {place} were sent to node {to}, and {came} came whole");
-                self.oracle.broken(now, Promise::RecordAccounts, text);
-            }
-        }
     }
 }

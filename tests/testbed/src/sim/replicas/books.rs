@@ -1,6 +1,6 @@
 //! The books of records: what was written, and whether what comes of it is so.
 
-use super::draw::StreamPlan;
+use super::stream::StreamPlan;
 use crate::sim::chance::Chance;
 use rohrpost_mailbox::{OriginRecord, Stamp};
 use std::collections::{BTreeMap, HashMap};

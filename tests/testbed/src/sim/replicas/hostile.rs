@@ -5,7 +5,7 @@ use super::super::seals::checked;
 use super::super::station::{Arrived, Origin};
 use super::super::world::{Event, World};
 use super::super::{clock::Now, packages::digest, spans::MS};
-use super::PORT;
+use super::leaving::PORT;
 use rohrpost_routers::frame::{DescriptionPart, FrameHead, FrameKind, PART_REQUEST_BYTES_MAX, PartRequest, RecordPart};
 
 impl World<'_> {
@@ -59,6 +59,7 @@ impl World<'_> {
                     written_ns: 0,
                     error_ns: 0,
                     step: any(chance, 3),
+                    sampled: any(chance, 5),
                     bytes: &noise,
                 };
                 (FrameKind::RecordPart, [&part.head_bytes()[..], &noise].concat())

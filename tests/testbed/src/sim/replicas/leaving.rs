@@ -1,13 +1,11 @@
 //! What leaves by the port of replicas: sealed if it is to be, and checked: each part is of a record as it was written,
 //! and requests and repeated parts are bounded as `routers/src/replication` promises.
 
-use super::PORT;
-use super::accounts::Sums;
+use super::accounts::RecordSums;
 use crate::sim::promise::Promise;
 use crate::sim::seals::{checked, sealed};
 use crate::sim::spans::S;
-use crate::sim::station::{Io, Sent};
-use rohrpost_config::Sampling;
+use crate::sim::station::{Io, Port, Sent};
 use rohrpost_mailbox::{Head, OriginRecord, Stamp};
 use rohrpost_routers::counts::Cause;
 use rohrpost_routers::driver::NotSent;
@@ -22,6 +20,8 @@ use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
 use std::sync::Arc;
 
+/// The socket of replicas.
+pub const PORT: Port = 2;
 /// Parts of a record leave again as often as it has parts, and so many times more.
 const MORE_AGAIN: u64 = 8;
 /// A record is asked for so often at most.
@@ -113,10 +113,13 @@ impl Leaving {
     }
 
     fn watch(&mut self, io: &mut Io<'_>, to: NodeIndex, clear: &[u8]) {
+        let frame = Frame::parse(clear);
         if io.plan.slots.is_none() {
-            io.oracle.paces_parts(io.now, io.life, clear.len() + self.overhead_bytes, &io.plan.shape);
+            let is_alive = matches!(frame, Ok((_, Frame::Alive(_))));
+            let bytes = clear.len() + self.overhead_bytes;
+            io.oracle.paces_parts(io.now, io.life, (bytes, is_alive), &io.plan.shape);
         }
-        match Frame::parse(clear) {
+        match frame {
             Ok((_, Frame::Replica(ReplicaFrame::Record(part)))) => self.leaves(io, to, &part),
             Ok((_, Frame::Replica(ReplicaFrame::Request(request)))) => self.asks(io, to, &request),
             Ok((_, Frame::Replica(ReplicaFrame::Description(_)))) => io.oracle.saw("a part of a description"),
@@ -162,19 +165,18 @@ impl Leaving {
         if part.offset > 0 {
             return;
         }
-        let Sums { sent, not_sent } = Sums::of(&self.counts[at]);
+        let RecordSums { sent, not_sent } = RecordSums::of(&self.counts[at]);
         let is_whole = part.bytes.len() == part.len as usize;
         let first = part.sequence.wrapping_add(is_whole.into()).wrapping_sub(sent + not_sent);
         let now = (first, part.sequence, self.counts[at].lost.of(ReplicaLoss::Absent));
         let (before, last, absent) = std::mem::replace(self.firsts.entry(course).or_insert(now), now);
         // To a node that was away the newest goes whatever became of it there, or it is passed over: it counts twice.
-        let its = &io.plan.streams[usize::from(part.place)];
+        let is_sampled = io.plan.streams[usize::from(part.place)].is_sampled();
         let was_away = part.sequence <= last || now.2 > absent;
-        let is_again = was_away || its.changed || its.sampling != Sampling::Each;
-        if before.wrapping_sub(first) > u64::from(is_again) {
+        if before.wrapping_sub(first) > u64::from(was_away || is_sampled) {
             let text = format!(
-                "node {} begins with record {} of stream {}; {sent} were sent to node {}, {not_sent} are counted with a \
-                 cause, and it began with {before}",
+                "node {} begins with record {} of stream {}; {sent} were sent to node {}, {not_sent} are counted with \
+                 a cause, and it began with {before}",
                 io.node, part.sequence, part.place, course.0
             );
             io.oracle.broken(io.now, Promise::RecordAccounts, text);

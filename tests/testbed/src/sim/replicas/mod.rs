@@ -1,12 +1,12 @@
 //! Replicas in a simulated network: the cores and drivers of the shell, on rings of real memory, watched.
 //!
 //! ```text
-//!  World: writers ─▶ Rings: ring of the origin ─▶ Replicas: sender ═ link ═▶ Replicas: receiver ─▶ ring there ─▶ readers
-//!            └──────▶ RecordBooks: what was written ◀── each part that leaves, each record that is read ◀─────────┘
+//!  writers ─▶ Rings: ring of the origin ─▶ Replicas: sender ═ link ═▶ Replicas: receiver ─▶ ring there ─▶ readers
+//!     └─────▶ RecordBooks: what was written ◀── each part that leaves, each record that is read ◀───────────┘
 //! ```
 //!
-//! Rings outlive the routers. Here: the two halves of one incarnation of a router. [`FreeReplicas`] runs them where there
-//! are no time slots; with them `sim/slotted` does.
+//! Rings outlive the routers. Here: the two halves of one incarnation of a router. [`FreeReplicas`] runs them where
+//! there are no time slots; with them `sim/slotted` does.
 
 mod accounts;
 mod books;
@@ -17,15 +17,18 @@ mod leaving;
 mod modules;
 mod receiving;
 mod rings;
+mod stream;
+mod streams;
 
 pub use books::RecordBooks;
-pub use draw::StreamPlan;
 pub(super) use free::FreeReplicas;
-pub(super) use modules::Streams;
+pub use leaving::PORT;
 pub use rings::Rings;
+pub use stream::StreamPlan;
+pub(super) use streams::Streams;
 
 use super::clock::Now;
-use super::station::{Io, Port};
+use super::station::Io;
 use accounts::Accounts;
 use leaving::Leaving;
 use rings::Interfaces;
@@ -40,8 +43,6 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The socket of replicas.
-pub const PORT: Port = 2;
 /// Modules that have begun are looked for this often, as in the shell, ns.
 const LOOK_EVERY_NS: u64 = 500_000_000;
 

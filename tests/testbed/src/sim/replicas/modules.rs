@@ -1,70 +1,18 @@
 //! The modules that write streams and read replicas: some die, come back, describe themselves anew, or make their
 //! stream anew; some read slowly, or begin late.
 
+use super::NodeTime;
 use super::books::{WrittenRecord, body, start_of};
-use super::{NodeTime, Rings, rings::words};
+use super::streams::{ReplicaReader, Streams};
 use crate::sim::promise::Promise;
 use crate::sim::spans::{MS, US};
 use crate::sim::world::{Event, World};
-use rohrpost_mailbox::{Name, Next, OriginRecord, RecordInfo, Stamp, StreamReader, StreamWriter};
-use std::collections::BTreeMap;
-use std::rc::Rc;
+use rohrpost_mailbox::{Next, OriginRecord, RecordInfo, Stamp};
 
+/// Records that may be on their way, or that are taken for others, at a moment.
+const ON_THE_WAY: u64 = 64;
 /// Of a reader that looks, so many records are read at a time at most.
 const READ_MAX: u64 = 64;
-
-/// All of a network.
-pub(in crate::sim) struct Streams {
-    rings: Rc<Rings>,
-    writers: Vec<Option<StreamWriter>>,
-    readers: Vec<ReplicaReader>,
-    /// How often each module has described itself.
-    editions: BTreeMap<Name, u32>,
-    body: Vec<u8>,
-}
-
-struct ReplicaReader {
-    stream: usize,
-    node: usize,
-    every_ns: u64,
-    seat: Option<StreamReader>,
-    /// Generation and sequence of what it read last.
-    last: Option<(u32, u64)>,
-    /// How often it was that once more.
-    again: u32,
-    /// Records that it read, and those that it was told to have lost.
-    accounts: (u64, u64),
-}
-
-impl Streams {
-    pub(in crate::sim) fn new(plan: &crate::sim::plan::Plan, rings: &Rc<Rings>) -> Self {
-        let reader = |stream: usize, &(node, every_ns): &(usize, u64)| ReplicaReader {
-            stream,
-            node,
-            every_ns,
-            seat: None,
-            last: None,
-            again: 0,
-            accounts: (0, 0),
-        };
-        let all = plan.streams.iter().enumerate();
-        let readers = all.flat_map(|(stream, its)| its.readers.iter().map(move |its| reader(stream, its))).collect();
-        let writers = plan.streams.iter().map(|_| None).collect();
-        Self { rings: rings.clone(), writers, readers, editions: BTreeMap::new(), body: Vec::new() }
-    }
-
-    pub(in crate::sim) fn readers(&self) -> usize {
-        self.readers.len()
-    }
-
-    /// A module says what it is.
-    fn describe(&mut self, node: usize, module: Name) {
-        let edition = self.editions.entry(module).or_default();
-        *edition += 1;
-        let laid = self.rings.join(node).describe_replicas(module, &words(module, *edition));
-        laid.expect("a node takes a description");
-    }
-}
 
 impl World<'_> {
     /// The next record of a stream.
@@ -193,7 +141,7 @@ impl World<'_> {
                 })
             })
         };
-        let oracle = &mut self.oracle;
+        let (oracle, plan) = (&mut self.oracle, &self.plan);
         match next {
             Ok(Next::Nothing) => return false,
             Ok(Next::Lost(lost)) => {
@@ -227,8 +175,11 @@ impl World<'_> {
                 oracle.broken(now, Promise::Records, format!("a reader on node {node} cannot read: {error}"));
             }
         }
-        if seat.accounts() != *accounts {
-            let text = format!("a reader on node {node} had {accounts:?}, and is told {:?}", seat.accounts());
+        // Each that it missed has one cause, as soon as it is known; and sampled is only what is to be.
+        let (missed, is_sampled) = (seat.missed(), plan.streams[*stream].is_sampled());
+        if seat.accounts() != *accounts || missed.all() > accounts.1 || missed.sampled > 0 && !is_sampled {
+            let text =
+                format!("a reader on node {node} had {accounts:?}, and is told {:?}, {missed:?}", seat.accounts());
             oracle.broken(now, Promise::RecordAccounts, text);
         }
         true
@@ -238,6 +189,20 @@ impl World<'_> {
     pub(in crate::sim) fn close_readers(&mut self) {
         for reader in 0..self.streams.readers() {
             while self.read_next(reader) && self.oracle.problems.is_empty() {}
+        }
+    }
+
+    /// What one end counts as sent the other counts as come.
+    pub(in crate::sim) fn close_records(&mut self) {
+        let now = self.now(0);
+        let books = &self.oracle.records;
+        let both = |(key, sent): (&(u16, u8), &u64)| Some((*key, *sent, *books.came.get(key)?));
+        let wrong: Vec<_> = books.sent.iter().filter_map(both).collect();
+        for ((place, to), sent, came) in wrong {
+            if came < sent || came > sent + ON_THE_WAY {
+                let text = format!("{sent} records of stream {place} were sent to node {to}, and {came} came whole");
+                self.oracle.broken(now, Promise::RecordAccounts, text);
+            }
         }
     }
 

@@ -18,7 +18,7 @@ use rohrpost_routers::security::{Port as SealedPort, Rejection};
 const LISTEN_NS: u64 = 100 * MS;
 const LISTEN_SHORTLY_NS: u64 = MS;
 
-struct RxSystem<'a, 'b> {
+struct PartRxSystem<'a, 'b> {
     io: &'a mut Io<'b>,
     receiver: &'a mut ReplicaReceiver,
 }
@@ -45,7 +45,7 @@ impl Deliver for RecordDelivery<'_, '_> {
     fn event(&mut self, _: RouterEvent) {}
 }
 
-impl RxPlatform for RxSystem<'_, '_> {
+impl RxPlatform for PartRxSystem<'_, '_> {
     fn delivery(&mut self) -> impl Deliver {
         RecordDelivery { io: self.io, receiver: self.receiver }
     }
@@ -61,7 +61,7 @@ impl RxPlatform for RxSystem<'_, '_> {
 
 /// Of a peer: datagrams that were taken, those that were damaged, and those that do not open.
 #[derive(Clone, Copy, Debug)]
-struct Counted {
+struct TakenCounts {
     taken: u64,
     damaged: u64,
     not_opened: u64,
@@ -79,7 +79,7 @@ impl Replicas {
         let source = arrived.source.map_or(STRANGER, address);
         let envelope = Envelope { source, arrived_ns, bytes: bytes.len() };
         let Self { driver, receiver, .. } = self;
-        driver.take(&mut RxSystem { io, receiver }, now_ns, &envelope, &mut bytes);
+        driver.take(&mut PartRxSystem { io, receiver }, now_ns, &envelope, &mut bytes);
         let after = self.counted(arrived);
         self.check_fate(io, arrived, (before, after));
     }
@@ -88,15 +88,15 @@ impl Replicas {
     pub(in crate::sim) fn receive(&mut self, io: &mut Io<'_>) -> u64 {
         let now_ns = io.now.monotonic_ns;
         let Self { driver, receiver, .. } = self;
-        let due_ns = driver.poll(&mut RxSystem { io, receiver }, now_ns);
+        let due_ns = driver.poll(&mut PartRxSystem { io, receiver }, now_ns);
         let time = NodeTime::of(io);
         let waits = self.receiver.poll(now_ns, || time.at(now_ns));
         due_ns.min(now_ns + if waits { LISTEN_SHORTLY_NS } else { LISTEN_NS })
     }
 
-    fn counted(&self, arrived: &Arrived) -> Counted {
+    fn counted(&self, arrived: &Arrived) -> TakenCounts {
         let Some(source) = arrived.source.map(|node| node as NodeIndex) else {
-            return Counted { taken: 0, damaged: 0, not_opened: 0 };
+            return TakenCounts { taken: 0, damaged: 0, not_opened: 0 };
         };
         let received = &self.leaving.stats.peer(source).received;
         let rejected = |why| {
@@ -104,7 +104,7 @@ impl Replicas {
             all.map_or(0, |all| all.rejections(SealedPort::Replicas).of(Some(source), why))
         };
         let never = [Rejection::Unsealed, Rejection::OtherKey, Rejection::NotOurs, Rejection::Address];
-        Counted {
+        TakenCounts {
             taken: received.datagrams.get(),
             damaged: received.damaged.get(),
             not_opened: never.into_iter().map(rejected).sum(),
@@ -113,7 +113,7 @@ impl Replicas {
 
     /// What was damaged is not taken, nor where datagrams are sealed what somebody made; what a router sent is neither
     /// damaged nor unsealed.
-    fn check_fate(&self, io: &mut Io<'_>, arrived: &Arrived, (before, after): (Counted, Counted)) {
+    fn check_fate(&self, io: &mut Io<'_>, arrived: &Arrived, (before, after): (TakenCounts, TakenCounts)) {
         let is_taken = after.taken > before.taken;
         io.oracle.saw(if is_taken { "taken by replicas" } else { "not taken by replicas" });
         match arrived.origin {

@@ -1,6 +1,6 @@
 //! Rings of the simulated computers: nodes as the mailboxes have them, in shared memory.
 
-use super::draw::StreamPlan;
+use super::stream::StreamPlan;
 use crate::sim::plan::Plan;
 use rohrpost_mailbox::{Name, Node, Participant, StreamId};
 use rohrpost_routers::frame::NodeIndex;
@@ -21,8 +21,8 @@ pub struct Rings {
     _folder: tempfile::TempDir,
     nodes: Vec<Arc<Node>>,
     replicas: Vec<ReplicaSettings>,
-    /// Records say when they were written by the clock of the computer that simulates: what that was on the clock of the
-    /// simulated one, ns.
+    /// Records say when they were written by the clock of the computer that simulates: what that was on the clock of
+    /// the simulated one, ns.
     moments: RefCell<HashMap<u64, u64>>,
 }
 
