@@ -268,8 +268,8 @@ fn feed_and_count(place: &Place, mut launch: Running, count: u64) -> (u64, u64, 
         feed(place, "feeder.0", 1);
         recorded(place).last().is_some_and(|(_, number)| *number > target).then_some(())
     });
-    let info = ["stream", "info", "feeder.0", "frame", "--json"];
-    let missed = place.say_at(&place.path("test.toml"), "brain", &info).json()["missed"].clone();
+    let words = ["stream", "info", "feeder.0", "frame", "--json"];
+    let missed = place.say_at(&place.path("test.toml"), "brain", &words).json()["missed"].clone();
     launch.stop();
     let (recorded, told) = (recorded(place), info(&file(place)).unwrap());
     assert!(recorded.is_sorted_by(|a, b| a.1 < b.1), "{recorded:?}");

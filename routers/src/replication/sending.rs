@@ -7,7 +7,7 @@
 
 use super::counts::SentReplica;
 use super::outgoing::OutgoingReplica;
-use super::requests::{OwnRequests, PartRequests};
+use super::requests::{PartRequests, RequestPlan, SentRequests};
 use super::settings::ReplicaSettings;
 use super::{Describe, part_bytes};
 use crate::frame::{self, NodeIndex, RECORD_PART_HEAD_BYTES};
@@ -44,7 +44,8 @@ pub struct ReplicaSender {
     part_bytes: usize,
     /// Incarnation of this router.
     incarnation: u64,
-    own_requests: OwnRequests,
+    plan: RequestPlan,
+    requests: SentRequests,
     /// The nodes that such requests go to, one bit each.
     origins: u64,
     /// The most important first.
@@ -61,9 +62,9 @@ impl ReplicaSender {
         streams.sort_by_key(|stream| stream.settings.level);
         let here = replicas.iter().filter(|replica| replica.to & 1 << settings.own != 0);
         let origins = here.fold(0, |all, replica| all | 1 << replica.node) & !(1 << settings.own);
-        let own_requests = OwnRequests::new(PartRequests::new(settings, replicas));
+        let (plan, requests) = (RequestPlan::new(settings, replicas), SentRequests::default());
         let (part_bytes, incarnation) = (part_bytes(settings), settings.incarnation);
-        Self { part_bytes, incarnation, own_requests, origins, streams, turns: [0; LEVELS] }
+        Self { part_bytes, incarnation, plan, requests, origins, streams, turns: [0; LEVELS] }
     }
 
     /// Whether no stream of this node has a replica, and this one has none.
@@ -71,9 +72,12 @@ impl ReplicaSender {
         self.streams.is_empty() && self.origins == 0
     }
 
-    /// The queues between this half and [`ReplicaReceiver::asking_by`](super::ReplicaReceiver::asking_by).
-    pub fn requests(&self) -> &Arc<PartRequests> {
-        self.own_requests.queues()
+    /// Rings between this half and [`ReplicaReceiver::asking_by`](super::ReplicaReceiver::asking_by): that one's ends.
+    /// What was there before is for nobody.
+    pub fn requests(&mut self) -> PartRequests {
+        let (receiving, sending) = self.plan.rings(self.counts());
+        self.requests = sending;
+        receiving
     }
 
     /// The nodes that something goes to, one bit each.
@@ -93,13 +97,11 @@ impl ReplicaSender {
         self.streams.iter_mut().for_each(|stream| stream.look(participant, describe));
     }
 
-    /// The streams that are read, to sleep until there is a record.
-    pub fn readers(&mut self) -> Vec<&mut StreamReader> {
-        self.streams
-            .iter_mut()
-            .filter(|stream| !stream.is_stalled)
-            .filter_map(|stream| stream.reader.as_mut())
-            .collect()
+    /// The streams that are read, to sleep until there is a record, and whether a request waits.
+    pub fn waits_on(&mut self) -> (Vec<&mut StreamReader>, impl Fn() -> bool + '_) {
+        let Self { streams, requests, .. } = self;
+        let awaited = streams.iter_mut().filter(|stream| !stream.is_stalled);
+        (awaited.filter_map(|stream| stream.reader.as_mut()).collect(), || !requests.is_empty())
     }
 
     /// The next datagram, or when to ask again. `datagram` has room for the largest; `system` tells system time at a
@@ -118,7 +120,7 @@ impl ReplicaSender {
             stream.refresh();
             stream.meet(now_ns, outbound);
         }
-        for (from, request) in self.own_requests.queues().take_next() {
+        for (from, request) in self.requests.take_next() {
             let stream = self.streams.iter_mut().find(|stream| stream.place == request.place);
             stream.into_iter().for_each(|stream| stream.ask(from, &request, (self.incarnation, self.part_bytes)));
         }
@@ -126,7 +128,7 @@ impl ReplicaSender {
             let ready = outbound.ready_peers();
             let chosen = self.choose(now_ns, ready);
             let level = chosen.map(|(at, _)| self.streams[at].settings.level);
-            match self.own_requests.next(now_ns, level, outbound, datagram) {
+            match self.requests.next(now_ns, level, outbound, datagram) {
                 Some(Ok((to, bytes))) => return ReplicaStep::Send { to, bytes },
                 Some(Err(until_ns)) => return ReplicaStep::Wait { until_ns },
                 None => {}

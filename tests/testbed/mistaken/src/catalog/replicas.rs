@@ -136,7 +136,7 @@ pub(crate) const RECORDS: Group = Group {
             text: "Replication: of records that came whole only the first is counted.",
             shows_in: IN_NETWORKS,
             edits: &[edit(
-                "replication/incoming.rs",
+                "replication/incoming/ending.rs",
                 "counts.records.add(1);",
                 "counts.records.add(u64::from(counts.records.get() == 0 || !broken!(CountsOneThatCame)));",
             )],
@@ -146,7 +146,7 @@ pub(crate) const RECORDS: Group = Group {
             text: "Replication: a record more is said to be left out on purpose before each.",
             shows_in: IN_NETWORKS,
             edits: &[edit(
-                "replication/incoming.rs",
+                "replication/incoming/ending.rs",
                 "writer.finish(record.sequence, sampled.into())",
                 "writer.finish(record.sequence, u64::from(sampled) + u64::from(broken!(SaysSampled)))",
             )],

@@ -68,10 +68,8 @@ impl FreeReplicas {
     /// Whether the thread that sends is awake: it is woken by records and by requests.
     fn is_awake(&mut self, io: &Io<'_>) -> bool {
         let sender = &mut self.replicas.sender;
-        let is_woken = !self.is_deaf && {
-            let has_request = !sender.requests().is_empty();
-            has_request || sender.readers().iter().any(|reader| reader.has_next())
-        };
+        let (readers, has_requests) = sender.waits_on();
+        let is_woken = !self.is_deaf && (has_requests() || readers.iter().any(|reader| reader.has_next()));
         is_woken || self.due_ns <= io.now.monotonic_ns
     }
 

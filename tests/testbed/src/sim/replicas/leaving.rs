@@ -24,7 +24,7 @@ use std::sync::Arc;
 pub const PORT: Port = 2;
 /// Parts of a record leave again as often as it has parts, and so many times more.
 const MORE_AGAIN: u64 = 8;
-/// A record is asked for so often at most.
+/// A record is asked for so often at most since the last part came by itself.
 const ASKED_MAX: u64 = 32;
 /// A replica asks so often a second at most, and so many requests more may wait to leave, or come after a pause.
 const ASKED_A_SECOND_MAX: usize = 500 + 32 + 32;
@@ -121,7 +121,7 @@ impl Leaving {
         }
         match frame {
             Ok((_, Frame::Replica(ReplicaFrame::Record(part)))) => self.leaves(io, to, &part),
-            Ok((_, Frame::Replica(ReplicaFrame::Request(request)))) => self.asks(io, to, &request),
+            Ok((_, Frame::Replica(ReplicaFrame::Request(request)))) => self.asks(io, to, &request.read()),
             Ok((_, Frame::Replica(ReplicaFrame::Description(_)))) => io.oracle.saw("a part of a description"),
             // Still there.
             _ => {}
@@ -195,7 +195,8 @@ impl Leaving {
             times.pop_front();
         }
         let (count, in_a_second) = (*count, times.len());
-        if count > ASKED_MAX || in_a_second > ASKED_A_SECOND_MAX {
+        let parts = u64::from(io.plan.streams[usize::from(place)].shape.record_bytes).div_ceil(self.part_bytes);
+        if count > ASKED_MAX * parts || in_a_second > ASKED_A_SECOND_MAX {
             let text = format!(
                 "node {} asks node {to} for record {sequence} of stream {place} for the {count}. time, and of that \
                  stream {in_a_second} times in a second",

@@ -66,7 +66,7 @@ impl Replicas {
         peer_sessions: Option<&Arc<PeerSessions>>,
     ) -> Self {
         let node = usize::from(settings.own);
-        let sender = ReplicaSender::new(settings, rings.replicas());
+        let mut sender = ReplicaSender::new(settings, rings.replicas());
         let receiver = ReplicaReceiver::new(settings, rings.replicas(), rings.join(node), Arc::new(Interfaces));
         let receiver = receiver.asking_by(sender.requests());
         let stats = Stats::of_rest(settings, all);
