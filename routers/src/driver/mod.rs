@@ -37,8 +37,9 @@ pub use free::{FreeDriver, FreeStep, Handover, Inlet, Nowhere, RealTimeOutlet, W
 pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};
 pub use outlet::Outlet;
+pub use parts::part_for_slot;
 pub use platform::{NotSent, Platform, SlotEvent};
-pub use replicas::{ReplicaDriver, ReplicaWait};
+pub use replicas::{ReplicaDriver, ReplicaWait, part_queue};
 pub use rest::{RestDriver, RestInlet, RestStep};
 pub use rx::{RxDriver, RxPlatform};
 pub use slots::SlotDriver;

@@ -14,8 +14,26 @@
 
 use super::platform::Platform;
 use crate::frame::NodeIndex;
+use crate::outbound::Outbound;
+use crate::replication::{ReplicaSender, ReplicaStep};
 use crate::settings::Settings;
 use crate::tdma::TransmitWindow;
+use rohrpost_mailbox::SystemTime;
+
+/// Writes the next part for a slot into a datagram; its receiver and its length.
+pub fn part_for_slot(
+    sender: &mut ReplicaSender,
+    queue: &mut Outbound,
+    now_ns: u64,
+    system: impl Fn(u64) -> SystemTime,
+    datagram: &mut [u8],
+) -> Option<(NodeIndex, usize)> {
+    queue.look_at_peers(now_ns);
+    match sender.poll(now_ns, system, queue, datagram) {
+        ReplicaStep::Send { to, bytes } => Some((to, bytes)),
+        ReplicaStep::Wait { .. } | ReplicaStep::Idle { .. } => None,
+    }
+}
 
 /// The next part.
 pub(super) struct NextPart {

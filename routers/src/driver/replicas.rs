@@ -1,9 +1,13 @@
 //! Sends parts of replicas, behind all packages: what leaves next, and for how long to wait.
 
 use super::outlet::{Outlet, Transmitter};
+use crate::outbound::Outbound;
 use crate::replication::{ReplicaSender, ReplicaStep};
+use crate::security::PeerSessions;
 use crate::settings::Settings;
+use crate::stats::Stats;
 use rohrpost_mailbox::SystemTime;
+use std::sync::Arc;
 
 /// The end of the router, modules that have begun, and peers that have come are looked at this often, ns.
 const LOOK_NS: u64 = 100_000_000;
@@ -25,6 +29,26 @@ pub enum ReplicaWait {
         /// For so long, ns.
         for_ns: u64,
     },
+}
+
+/// The queue by which parts of replicas leave, and count in `stats`. No package waits in it, so it needs no room for
+/// those of modules; the wire it leaves to those of `before`, of which the first is the real-time half.
+pub fn part_queue(
+    settings: &Settings,
+    sender: &ReplicaSender,
+    stats: Arc<Stats>,
+    before: (&Arc<Stats>, Option<&Arc<Stats>>),
+    peer_sessions: Option<&Arc<PeerSessions>>,
+) -> Outbound {
+    let alone = Settings { senders: Vec::new(), ..settings.clone() };
+    let mut queue = Outbound::new(&alone, stats).behind(before.0).only_to(sender.peers());
+    if let Some(rest) = before.1 {
+        queue = queue.yielding_to(rest);
+    }
+    match peer_sessions {
+        Some(all) => queue.sealed(all.clone()),
+        None => queue,
+    }
 }
 
 /// Sends the parts of all replicas of a node's streams.

@@ -3,6 +3,7 @@
 mod asked;
 mod by_line;
 mod changed;
+mod damaged;
 mod hops;
 mod hostile;
 mod joining;
@@ -11,6 +12,7 @@ mod older;
 mod requests;
 mod sealed;
 mod slow;
+mod stepped;
 
 use super::{Describe, ReceivedReplica, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};

@@ -19,14 +19,12 @@ use super::threads::{Shared, schedule_below};
 use super::wire::PeerSockets;
 use super::{Shell, ShellError};
 use crate::counts::Cause;
-use crate::driver::{ReplicaDriver, ReplicaWait, RxDriver};
+use crate::driver::{ReplicaDriver, ReplicaWait, RxDriver, part_queue};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
 use crate::impair;
-use crate::outbound::Outbound;
 use crate::replication::{Describe, ReplicaCounts, ReplicaReceiver, ReplicaSender, ReplicaSettings};
 use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
 use crate::security::{Gate, Port, Sealing};
-use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Name, Node, Participant, SystemClock, monotonic_ns, wait_any};
 use std::os::fd::OwnedFd;
@@ -178,15 +176,8 @@ impl Shell {
         let awaits = self.slot_parts.is_none().then(|| sending.clone());
         let delivery = ReplicaDelivery { receiver, clock: SystemClock::open(node), sending: awaits };
         self.receive_replicas(delivery, &stats, parts.socket)?;
-        // No package waits in it, so it needs no room for those of modules.
-        let alone = Settings { senders: Vec::new(), ..(*settings).clone() };
-        let mut outbound = Outbound::new(&alone, stats).behind(&self.stats).only_to(sender.peers());
-        if let Some(rest) = &self.rest_stats {
-            outbound = outbound.yielding_to(rest);
-        }
-        if let Some(all) = &self.peer_sessions {
-            outbound = outbound.sealed(all.clone());
-        }
+        let before = (&self.stats, self.rest_stats.as_ref());
+        let outbound = part_queue(&settings, &sender, stats, before, self.peer_sessions.as_ref());
         let sealing = self.peer_sessions.as_ref().map(|all| Sealing::new(all, Port::Replicas));
         let port = settings.network.replica_port();
         let wire = PeerSockets::new(&settings, port, sealing, parts.impair, &self.failures);

@@ -5,6 +5,8 @@
 mod guard;
 #[path = "simulated/rare.rs"]
 mod rare;
+#[path = "simulated/replicas.rs"]
+mod replicas;
 #[path = "simulated/seen.rs"]
 mod seen;
 mod simulated;

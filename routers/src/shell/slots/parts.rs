@@ -1,9 +1,9 @@
 //! Parts of replicas, as the thread of the time slots has them.
 
 use super::super::sending::{NoPackages, Sending};
-use crate::driver::{NotSent, Outlet};
+use crate::driver::{NotSent, Outlet, part_for_slot};
 use crate::frame::NodeIndex;
-use crate::replication::{ReplicaSender, ReplicaStep};
+use crate::replication::ReplicaSender;
 use rohrpost_mailbox::{SystemClock, monotonic_ns};
 use std::sync::{Arc, Mutex};
 
@@ -19,12 +19,8 @@ impl SlotParts {
     /// Writes the next part; its receiver and its length.
     pub(super) fn next(&mut self, datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
         let Self { sender, sending: Sending { outbound, .. }, clock } = self;
-        let (mut sender, now_ns) = (sender.try_lock().ok()?, monotonic_ns());
-        outbound.look_at_peers(now_ns);
-        match sender.poll(now_ns, |ns| clock.at(ns), outbound, datagram) {
-            ReplicaStep::Send { to, bytes } => Some((to, bytes)),
-            ReplicaStep::Wait { .. } | ReplicaStep::Idle { .. } => None,
-        }
+        let mut sender = sender.try_lock().ok()?;
+        part_for_slot(&mut sender, outbound, monotonic_ns(), |ns| clock.at(ns), datagram)
     }
 
     /// Hands it to the kernel.

@@ -27,7 +27,7 @@ const HEADS_BYTES: u64 = 100;
 
 impl Plan {
     /// The declared flows come first; behind them one flood for each node, of the lowest level, and in every other
-    /// network a replica without end.
+    /// network each has replicas of streams of all others, written faster than any slot carries.
     pub fn declared(seed: u64) -> Self {
         let mut plan = Self::small_slotted(seed);
         let mut chance = Chance::new(seed ^ 0xf10);
@@ -51,7 +51,9 @@ impl Plan {
         if let Some(slots) = &mut plan.slots {
             (slots.late_ppm, slots.still_ppm, slots.divisions) = (0, 0, Divisions::default());
             slots.oversleeps_percent = chance.pick(&[0, 20, 100]);
-            slots.replicates = seed % 2 == 1;
+        }
+        if seed % 2 == 1 {
+            plan.draw_endless();
         }
         plan
     }

@@ -123,6 +123,15 @@ pub enum Fault {
         /// How many.
         count: u64,
     },
+    /// A node sends another one parts of records and requests that nobody should send.
+    Parts {
+        /// The sender.
+        from: usize,
+        /// The receiver.
+        to: usize,
+        /// How many.
+        count: u64,
+    },
     /// Datagrams that were sent long ago come once more.
     Replay {
         /// The receiver.

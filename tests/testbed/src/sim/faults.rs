@@ -94,6 +94,7 @@ impl World<'_> {
                     self.at(at_ns, Event::Arrive { to, arrived });
                 }
             }
+            Fault::Parts { from, to, count } => self.send_hostile(from, to, count),
             Fault::Intruder { node, count } => (0..count).for_each(|_| self.intrude(node)),
             Fault::Forged { from, to, count } => {
                 self.oracle.saw("forged");
@@ -164,7 +165,7 @@ impl World<'_> {
             Fault::Unsendable { node } => self.stations[node].host.unsendable -= 1,
             Fault::Echo { to, .. } => self.stations[to].echo_ns = None,
             Fault::Step { .. } | Fault::Foreign { .. } | Fault::Forged { .. } | Fault::Replay { .. } => {}
-            Fault::Intruder { .. } => {}
+            Fault::Intruder { .. } | Fault::Parts { .. } => {}
         }
     }
 

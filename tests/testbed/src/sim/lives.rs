@@ -30,6 +30,8 @@ pub struct Sending {
     pub(super) newest: u32,
     /// All that has left is through then, at the configured rate, on the node's monotonic clock.
     pub(super) through_ns: u64,
+    /// The same with what has left by the port of replicas.
+    pub(super) all_through_ns: u64,
     /// Level of the most urgent package in the datagram that left last.
     pub(super) last: usize,
 }

@@ -195,6 +195,8 @@ impl World<'_> {
             let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { continue };
             self.with_router(node, life, |router, io| router.layers.iter_mut().for_each(|layer| layer.close(io)));
         }
+        self.close_readers();
+        self.close_records();
         let well_ns = self.oracle.well_ns;
         let now = self.now(0);
         for (index, call) in self.calls.all.iter().enumerate() {

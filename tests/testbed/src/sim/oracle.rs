@@ -9,6 +9,7 @@ use super::clock::Now;
 use super::lives::{Receiving, Sending};
 use super::package::{Package, Role, SendStage, admitted};
 use super::promise::{Problem, Promise};
+use super::replicas::RecordBooks;
 use super::table::Table;
 use super::times::Times;
 use super::wire::Wire;
@@ -38,6 +39,10 @@ pub struct Oracle {
     pub(super) heard: Table<(usize, usize), (u64, u32, u32)>,
     /// From posting to delivery at most, ns, by sender, mailbox and priority.
     pub slowest_ns: BTreeMap<(Name, Name, u8), u64>,
+    /// The records of all streams.
+    pub records: RecordBooks,
+    /// From writing to reading of a replica at most, ns.
+    pub slowest_record_ns: u64,
     /// What was broken.
     pub problems: Vec<Problem>,
     /// What was seen, so that a test knows that it saw enough.

@@ -58,6 +58,17 @@ pub enum Promise {
     /// With time slots each datagram is on the wire in a window of its sender, before its guard, as the sender reckons,
     /// and none is sent in a window for which the wake-up came too late.
     InWindow,
+    /// A record that a reader of a replica gets is whole and unchanged, with the sequence, incarnation and stamp of its
+    /// origin; so is each part that leaves, and what was damaged, or made without the key, is not taken.
+    Records,
+    /// Sequences of one life of a stream do not go back, lives do not go back, and no record is read twice.
+    RecordOrder,
+    /// Each record is sent, or not sent for a cause that is counted; it is read, or its reader is told of one more that
+    /// it lost; what both ends count agrees.
+    RecordAccounts,
+    /// Requests for parts and parts that leave again are few, parts leave the wire to packages, and a node has no more
+    /// than its replicas.
+    RecordBounds,
     /// With time slots nobody sends while its own bound is greater than what is allowed, or while it is further off in
     /// truth.
     SilentWhenUnsure,
@@ -85,6 +96,10 @@ impl Promise {
         Self::OneMaster,
         Self::Exclusive,
         Self::InWindow,
+        Self::Records,
+        Self::RecordOrder,
+        Self::RecordAccounts,
+        Self::RecordBounds,
         Self::SilentWhenUnsure,
     ];
 }

@@ -4,6 +4,7 @@ use super::calls::NewGuard;
 use super::packages::{Free, Packages, settings};
 use super::plan::{Flow, Plan, incarnation};
 use super::promise::Problem;
+use super::replicas::{FreeReplicas, Replicas, Rings};
 use super::seals;
 use super::slotted::Slotted;
 use super::station::Layer;
@@ -29,8 +30,9 @@ pub struct Outcome {
 /// Runs a plan.
 pub fn run(plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
     let plan = Rc::new(plan);
-    let layers = routers(&plan);
-    let mut world = World::new(plan.clone(), guard, layers, trace);
+    let rings = Rc::new(Rings::new(&plan));
+    let layers = routers(&plan, &rings);
+    let mut world = World::new(plan.clone(), guard, &rings, layers, trace);
     world.run();
     let oracle = world.oracle;
     let slowest =
@@ -40,8 +42,8 @@ pub fn run(plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
 }
 
 /// Routers as this version has them.
-fn routers(plan: &Rc<Plan>) -> NewLayers<'static> {
-    let plan = plan.clone();
+fn routers(plan: &Rc<Plan>, rings: &Rc<Rings>) -> NewLayers<'static> {
+    let (plan, rings) = (plan.clone(), rings.clone());
     Box::new(move |node, edition, life, now, page| {
         let incarnation = incarnation(plan.seed, life);
         let settings = settings(&plan, node, incarnation, edition);
@@ -52,11 +54,16 @@ fn routers(plan: &Rc<Plan>) -> NewLayers<'static> {
             let all = seals::peer_sessions(&settings);
             (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all, plan.slots.is_some()));
         }
+        let has_streams = !plan.streams.is_empty();
+        let replicas =
+            has_streams.then(|| Replicas::new((&settings, packages.all_stats()), &rings, packages.peer_sessions()));
         if let Some(slots) = plan.slots_of(edition) {
             let (own, nodes) = (settings.own, plan.nodes.len() as u8);
             let table = SlotTable::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());
-            return vec![Box::new(Slotted::new(packages, ticking, &settings, table, now))];
+            return vec![Box::new(Slotted::new((packages, ticking, replicas), &settings, table, now))];
         }
-        vec![Box::new(Free::new(packages, &settings)) as Box<dyn Layer>, Box::new(ticking)]
+        let replicas = replicas.map(|replicas| Box::new(FreeReplicas::new(replicas, &settings)) as Box<dyn Layer>);
+        let layers = [Box::new(Free::new(packages, &settings)) as Box<dyn Layer>, Box::new(ticking)];
+        layers.into_iter().chain(replicas).collect()
     })
 }

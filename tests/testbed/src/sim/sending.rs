@@ -181,6 +181,7 @@ impl Oracle {
         let ahead_ns = sending.through_ns.saturating_sub(now.monotonic_ns);
         let takes_ns = (datagram.len() + overhead_bytes) as u64 * 1_000_000_000 / shape.rate_bytes_s;
         sending.through_ns = sending.through_ns.max(now.monotonic_ns) + takes_ns;
+        sending.all_through_ns = sending.all_through_ns.max(now.monotonic_ns) + takes_ns;
         let Some(first) = first else { return };
         // What is more urgent than what left last may go in advance, by one datagram.
         let advance_ns = match first < sending.last {
@@ -190,6 +191,20 @@ impl Oracle {
         sending.last = first;
         if ahead_ns > AHEAD_NS_MAX + advance_ns {
             self.broken(now, Promise::Pace, format!("a datagram leaves {ahead_ns} ns before its time"));
+        }
+    }
+
+    /// Without time slots a part of a replica leaves only at the rate that packages leave to it; "still there" goes
+    /// anyway.
+    pub fn paces_parts(&mut self, now: Now, life: u32, (bytes, is_alive): (usize, bool), shape: &Shape) {
+        let sending = self.sending.entry(life).or_default();
+        let ahead_ns = sending.all_through_ns.saturating_sub(now.monotonic_ns);
+        let takes_ns = |bytes: usize| bytes as u64 * 1_000_000_000 / shape.rate_bytes_s;
+        sending.all_through_ns = sending.all_through_ns.max(now.monotonic_ns) + takes_ns(bytes);
+        let advance_ns = takes_ns(2 * shape.datagram_bytes_max);
+        if ahead_ns > AHEAD_NS_MAX + advance_ns && !is_alive {
+            let text = format!("a datagram leaves by the port of replicas {ahead_ns} ns before its time");
+            self.broken(now, Promise::RecordBounds, text);
         }
     }
 

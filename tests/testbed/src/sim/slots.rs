@@ -37,8 +37,6 @@ pub struct Slots {
     /// A router has system time and may send so long after it began, where nothing goes wrong but that others begin
     /// too; none: it is not asked.
     pub joins_ns: Option<u64>,
-    /// Each node sends parts of a replica without end behind its packages.
-    pub replicates: bool,
 }
 
 impl Slots {

@@ -2,9 +2,9 @@
 //! thread, on a simulated platform, and watched.
 
 use super::clock::Now;
-use super::flood::{self, PartFlood};
 use super::packages::{Packages, TransitAdapter};
 use super::promise::Promise;
+use super::replicas::{self, Replicas};
 use super::spans::RECOVERY_NS;
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use super::ticking::{self, Ticking};
@@ -28,7 +28,7 @@ pub struct Slotted {
     packages: Packages,
     time: Ticking,
     driver: SlotDriver,
-    flood: PartFlood,
+    replicas: Option<Replicas>,
     watch: WindowWatch,
     /// It does nothing before, ns of its monotonic clock: it sleeps or is busy.
     wake_ns: u64,
@@ -55,7 +55,7 @@ struct WindowWatch {
 struct Ground<'a, 'b> {
     packages: &'a mut Packages,
     time: &'a mut Ticking,
-    flood: &'a mut PartFlood,
+    replicas: &'a mut Option<Replicas>,
     watch: &'a mut WindowWatch,
     io: &'a mut Io<'b>,
 }
@@ -112,13 +112,13 @@ impl Platform for Ground<'_, '_> {
     fn tidy(&mut self, _: u64) {}
 
     fn next_part(&mut self, datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
-        self.io.plan.slots.as_ref().filter(|slots| slots.replicates)?;
+        let replicas = self.replicas.as_mut()?;
         self.io.works(MAKING_NS);
-        self.flood.next(datagram)
+        replicas.next_part(self.io, datagram)
     }
 
     fn send_part(&mut self, to: NodeIndex, buffer: &mut [u8], bytes: usize) {
-        flood::send(self.io, to, &buffer[..bytes]);
+        self.replicas.iter_mut().for_each(|replicas| replicas.send_part(self.io, to, &buffer[..bytes]));
     }
 
     fn publish(&mut self, _: &SlotScheduler, _: &WindowLog) {
@@ -259,7 +259,12 @@ impl Ground<'_, '_> {
 
 impl Slotted {
     /// An incarnation that begins now, of these two.
-    pub fn new(packages: Packages, time: Ticking, settings: &Settings, table: SlotTable, now: Now) -> Self {
+    pub fn new(
+        (packages, time, replicas): (Packages, Ticking, Option<Replicas>),
+        settings: &Settings,
+        table: SlotTable,
+        now: Now,
+    ) -> Self {
         let (time, spin_ns) = (time.in_slots(&table), spin_ns(table.cycle_ns()));
         let watch = WindowWatch {
             allowance_ns: table.allowance_ns(),
@@ -271,18 +276,17 @@ impl Slotted {
         };
         let (scheduler, settings) = (SlotScheduler::new(table, spin_ns), Arc::new(settings.clone()));
         let driver = SlotDriver::new(&settings, packages.peer_sessions(), scheduler, now.monotonic_ns);
-        let flood = PartFlood::new(&settings);
-        Self { packages, time, driver, flood, watch, wake_ns: 0, due_ns: 0 }
+        Self { packages, time, driver, replicas, watch, wake_ns: 0, due_ns: 0 }
     }
 
     /// The thread runs until it sleeps, or spins for what only time brings.
     fn run(&mut self, io: &mut Io<'_>) {
-        let Self { packages, time, driver, flood, watch, .. } = self;
+        let Self { packages, time, driver, replicas, watch, .. } = self;
         if std::mem::take(&mut watch.stood_still) {
             // What came of that is seen now.
             time.publish(io);
         }
-        let step = driver.poll(&mut Ground { packages, time, flood, watch, io });
+        let step = driver.poll(&mut Ground { packages, time, replicas, watch, io });
         let now_ns = io.now.monotonic_ns;
         self.watch.stood_still = io.stood_still();
         (self.wake_ns, self.due_ns) = match step {
@@ -311,7 +315,7 @@ impl Layer for Slotted {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         match arrived.port {
             ticking::PORT => self.time.handle(io, arrived),
-            flood::PORT => {}
+            replicas::PORT => self.replicas.iter_mut().for_each(|replicas| replicas.handle(io, arrived)),
             _ => self.packages.handle(io, arrived),
         }
     }
@@ -323,7 +327,11 @@ impl Layer for Slotted {
     }
 
     fn poll(&mut self, io: &mut Io<'_>) -> u64 {
-        let idle_ns = self.packages.receive(io);
+        let mut idle_ns = self.packages.receive(io);
+        if let Some(replicas) = &mut self.replicas {
+            idle_ns = idle_ns.min(replicas.receive(io));
+            replicas.find_streams(io);
+        }
         if self.wake_ns <= io.now.monotonic_ns {
             self.run(io);
         }
@@ -355,11 +363,13 @@ impl Layer for Slotted {
         }
         self.time.check(io, well);
         self.packages.check(io, well);
+        self.replicas.iter_mut().for_each(|replicas| replicas.check(io, well));
     }
 
     fn close(&mut self, io: &mut Io<'_>) {
         self.time.close(io);
         self.packages.close(io);
+        self.replicas.iter_mut().for_each(|replicas| replicas.close(io));
     }
 }
 

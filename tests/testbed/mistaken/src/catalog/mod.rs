@@ -22,6 +22,7 @@ pub const GROUPS: &[Group] = &[
     line::LINE,
     rejecting::REJECTING,
     replicas::REPLICAS,
+    replicas::RECORDS,
     session::SESSION,
     slots::IN_SLOT,
     slots::SLOTS,

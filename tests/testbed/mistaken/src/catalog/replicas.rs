@@ -1,6 +1,6 @@
 //! What could go wrong with replicas: at their port where datagrams are sealed, and with what is left out.
 
-use super::planted::{Group, Planted, edit};
+use super::planted::{Group, IN_NETWORKS, Planted, edit};
 
 pub(crate) const REPLICAS: Group = Group {
     name: "REPLICAS",
@@ -69,6 +69,171 @@ pub(crate) const REPLICAS: Group = Group {
         (self.under_way, self.before, self.begun) = (None, None, [None; ASKED_MAX]);",
                 ),
             ],
+        },
+    ],
+};
+
+pub(crate) const RECORDS: Group = Group {
+    name: "RECORDS",
+    text: "Mistakes with records, which simulated networks show.",
+    mistakes: &[
+        Planted {
+            name: "PublishesIncomplete",
+            text: "Replication: a record of which a part is missing is whole.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/gathering.rs",
+                "self.is_open && self.missing == 0",
+                "self.is_open && (self.missing == 0 || broken!(PublishesIncomplete) && self.missing == 1)",
+            )],
+        },
+        Planted {
+            name: "MixesRecords",
+            text: "Replication: a part of another record is put into the one that is open.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/gathering.rs",
+                "arriving.record == *record)",
+                "arriving.record == *record || broken!(MixesRecords))",
+            )],
+        },
+        Planted {
+            name: "SaysOtherIncarnation",
+            text: "Replication: a record has another incarnation than at its origin.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/gathering.rs",
+                "            incarnation: part.incarnation,",
+                "            incarnation: if broken!(SaysOtherIncarnation) { 1 } else { part.incarnation },",
+            )],
+        },
+        Planted {
+            name: "CutsElsewhere",
+            text: "Replication: a part has the bytes of another place of its record.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/outgoing.rs",
+                "bytes: &record.body()[offset..end],",
+                r"bytes: if broken!(CutsElsewhere) {
+                &record.body()[offset / 2..end - offset.div_ceil(2)]
+            } else {
+                &record.body()[offset..end]
+            },",
+            )],
+        },
+        Planted {
+            name: "TakesRecordsBack",
+            text: "Replication: a record that is older than the newest makes its stream anew.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/incoming.rs",
+                "if is_behind || !self.is_anew(life, record.sequence, next) {",
+                "if is_behind || !broken!(TakesRecordsBack) && !self.is_anew(life, record.sequence, next) {",
+            )],
+        },
+        Planted {
+            name: "CountsOneThatCame",
+            text: "Replication: of records that came whole only the first is counted.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/incoming/ending.rs",
+                "counts.records.add(1);",
+                "counts.records.add(u64::from(counts.records.get() == 0 || !broken!(CountsOneThatCame)));",
+            )],
+        },
+        Planted {
+            name: "SaysSampled",
+            text: "Replication: a record more is said to be left out on purpose before each.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/incoming/ending.rs",
+                "writer.finish(record.sequence, sampled.into())",
+                "writer.finish(record.sequence, u64::from(sampled) + u64::from(broken!(SaysSampled)))",
+            )],
+        },
+        Planted {
+            name: "CountsRecordsTwice",
+            text: "Replication: a record of two parts or more is counted as sent with each.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/outgoing.rs",
+                "        if end == len {",
+                r"        if broken!(CountsRecordsTwice) && end < len {
+            destination.counts.records.add(1);
+        }
+        if end == len {",
+            )],
+        },
+        Planted {
+            name: "ForgetsOverwritten",
+            text: "Replication: a record that was overwritten on its way is not counted.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/destination.rs",
+                "        self.counts.lost.add(cause, 1);
+    }
+
+    fn again_of",
+                r"        self.counts.lost.add(cause, if broken!(ForgetsOverwritten) { 0 } else { 1 });
+    }
+
+    fn again_of",
+            )],
+        },
+        Planted {
+            name: "AsksForEver",
+            text: "Replication: a record is asked for at once and again, however often it was.",
+            shows_in: IN_NETWORKS,
+            edits: &[
+                edit(
+                    "replication/gathering.rs",
+                    "(self.is_due || is_quiet)",
+                    "(self.is_due || is_quiet || broken!(AsksForEver))",
+                ),
+                edit(
+                    "replication/gathering.rs",
+                    "self.rounds >= ROUNDS_MAX",
+                    "self.rounds >= ROUNDS_MAX && !broken!(AsksForEver)",
+                ),
+            ],
+        },
+        Planted {
+            name: "RepeatsForEver",
+            text: "Replication: what is asked for at once and again leaves however often it did.",
+            shows_in: IN_NETWORKS,
+            edits: &[
+                edit(
+                    "replication/gathering.rs",
+                    "let is_quiet = now_ns",
+                    "let is_quiet = broken!(RepeatsForEver) || now_ns",
+                ),
+                edit(
+                    "replication/again.rs",
+                    "*word & bit == 0 && self.budget > 0",
+                    "*word & bit == 0 && (self.budget > 0 || broken!(RepeatsForEver))",
+                ),
+                edit("replication/again.rs", "self.budget - 1", "self.budget - usize::from(!broken!(RepeatsForEver))"),
+            ],
+        },
+        Planted {
+            name: "PartsUnpaced",
+            text: "Outbound: parts of replicas leave faster than they may.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "outbound/carry.rs",
+                "if self.in_slots { Ok(()) }",
+                "if self.in_slots || broken!(PartsUnpaced) { Ok(()) }",
+            )],
+        },
+        Planted {
+            name: "DescribesOnce",
+            text: "Replication: a description that was lost is not sent again.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "replication/outgoing.rs",
+                "destination.describe_ns = now_ns + DESCRIBE_EVERY_NS;",
+                "destination.describe_ns = if broken!(DescribesOnce) { u64::MAX } else { now_ns + DESCRIBE_EVERY_NS };",
+            )],
         },
     ],
 };

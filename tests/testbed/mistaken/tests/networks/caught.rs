@@ -21,6 +21,10 @@ pub(crate) enum Network {
     Declared,
     /// Slots beside nodes of other tables.
     Edited,
+    /// With replicas of streams.
+    Replicated,
+    /// The same with slots.
+    SlottedReplicated,
 }
 
 impl Network {
@@ -38,6 +42,8 @@ impl Network {
             Self::UnsteadySlotted => Plan::unsteady_slotted(seed),
             Self::Declared => Plan::declared(seed),
             Self::Edited => Plan::edited(seed),
+            Self::Replicated => Plan::new(seed).replicated(),
+            Self::SlottedReplicated => Plan::small_slotted(seed).replicated(),
         }
     }
 }
@@ -143,6 +149,22 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::DeafToOtherTables, Promise::Exclusive, Network::Edited, 2),
     caught(Mistake::NeverYieldsToOthers, Promise::Exclusive, Network::Edited, 10),
     caught(Mistake::NeverBeginsEpoch, Promise::Recovery, Network::Slotted, 19),
+    // Replicas.
+    caught(Mistake::SkipsCheck, Promise::Records, Network::Replicated, 37),
+    caught(Mistake::PublishesIncomplete, Promise::Records, Network::Replicated, 1),
+    caught(Mistake::MixesRecords, Promise::Records, Network::Replicated, 6),
+    caught(Mistake::SaysOtherIncarnation, Promise::Records, Network::Replicated, 0),
+    caught(Mistake::CutsElsewhere, Promise::Records, Network::SlottedReplicated, 1),
+    caught(Mistake::TakesRecordsBack, Promise::RecordOrder, Network::Replicated, 8),
+    caught(Mistake::CountsOneThatCame, Promise::RecordAccounts, Network::Replicated, 0),
+    caught(Mistake::SaysSampled, Promise::RecordAccounts, Network::Replicated, 1),
+    caught(Mistake::CountsRecordsTwice, Promise::RecordAccounts, Network::Replicated, 1),
+    caught(Mistake::ForgetsOverwritten, Promise::RecordAccounts, Network::Replicated, 26),
+    caught(Mistake::AsksForEver, Promise::RecordBounds, Network::Replicated, 1),
+    caught(Mistake::RepeatsForEver, Promise::RecordBounds, Network::Replicated, 1),
+    caught(Mistake::PartsUnpaced, Promise::RecordBounds, Network::Replicated, 1),
+    caught(Mistake::OverrunsWithPart, Promise::InWindow, Network::SlottedReplicated, 1),
+    caught(Mistake::DescribesOnce, Promise::Recovery, Network::Replicated, 34),
 ];
 
 /// Mistakes that break no promise here, and why. The routers' own tests show each.
@@ -160,5 +182,6 @@ pub(crate) const UNSEEN: &[(Mistake, &str)] = &[
     (Mistake::BelievesUnopened, "120 networks kept all promises: a belief changes what callers are told"),
 ];
 
-/// Groups of mistakes of sessions and of replicas, which no simulated network has.
+/// Groups of mistakes of sessions, which no simulated network has, and of keys and sampling of replicas: the cores' own
+/// tests show these.
 pub(crate) const UNSEEN_GROUPS: [&str; 4] = ["SESSION", "FOLLOWER", "REPLICAS", "LINE"];

@@ -45,6 +45,8 @@ pub const PORT: Port = 0;
 const STILL_NS: u64 = 400_000_000;
 /// The thread that receives looks around so often, if nothing comes.
 const LISTEN_NS: u64 = 100_000_000;
+/// Before a datagram, so many packages at most are taken that hurry more than they may.
+const FEW: usize = 4;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 
@@ -56,6 +58,8 @@ pub struct Packages {
     receiver: RxDriver,
     /// Bytes that the queue may take up.
     queue_bytes_max: u64,
+    /// Packages that hurry more than they may, taken since the last datagram.
+    hurried: usize,
     /// Taken last from the transit mailbox.
     in_hand: Option<Parcel>,
     /// Since when it runs without standing still, and when it ran last.
@@ -86,6 +90,11 @@ impl Packages {
         &self.stats
     }
 
+    /// The same, for what counts beside.
+    pub(super) fn all_stats(&self) -> &Arc<Stats> {
+        &self.stats
+    }
+
     /// Its sessions, where datagrams are sealed.
     pub(super) fn peer_sessions(&self) -> Option<&Arc<PeerSessions>> {
         self.seals.as_ref().map(|seals| &seals.all)
@@ -99,6 +108,7 @@ impl Packages {
             receiver: RxDriver::new(settings, &stats, None),
             queue_bytes_max: (settings.network.quota_bytes as u64 + 1024) * (settings.senders.len() as u64 + 1),
             in_hand: None,
+            hurried: 0,
             lost_before: None,
             answers: VecDeque::new(),
             seals: None,
@@ -133,6 +143,7 @@ impl Packages {
         };
         io.oracle.accepted(io.life, parcel.number, parcel.published_ns);
         io.oracle.saw("accepted");
+        self.hurried += usize::from(hurries(&parcel.head));
         let to = self.settings.node_of(parcel.head.to);
         if let (Some(seals), Some(to)) = (&self.seals, to)
             && !seals.knows(to)
@@ -193,8 +204,9 @@ impl Packages {
         io.oracle.leaves(now, io.life, bytes);
         if io.plan.slots.is_some() {
             let reaches = |to| self.seals.as_ref().is_none_or(|seals| seals.knows(to));
-            // Of those that hurry more than they may, only a few are taken before a datagram.
-            let first = io.host.transit.first().filter(|first| !hurries(&first.head));
+            // Of those that hurry more than they may, only a few are taken before a datagram; what is behind waits.
+            let is_held_up = std::mem::take(&mut self.hurried) >= FEW;
+            let first = io.host.transit.first().filter(|first| !is_held_up && !hurries(&first.head));
             let first = first.filter(|first| self.settings.node_of(first.head.to).is_some_and(reaches));
             let behind = first.map(|first| first.number);
             io.oracle.is_strict(now, io.life, bytes, behind, reaches);

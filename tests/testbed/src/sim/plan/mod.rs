@@ -12,6 +12,7 @@ pub(super) use draw::{masters, node};
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
 use super::link::Quality;
+use super::replicas::StreamPlan;
 use super::slots::Slots;
 use super::spans::{DRAIN_NS, EPOCH_PAUSE_NS, RECOVERY_NS, S, TIMED_INTERVALS, WELL_NS};
 use rohrpost_mailbox::Name;
@@ -121,6 +122,8 @@ pub struct Plan {
     pub edited: Vec<Slots>,
     /// Data.
     pub flows: Vec<Flow>,
+    /// Streams that other nodes have replicas of.
+    pub streams: Vec<StreamPlan>,
     /// Commands.
     pub calls: Vec<CallPlan>,
     /// What goes wrong.
@@ -178,6 +181,7 @@ impl Plan {
             shape,
             quality,
             flows: Vec::new(),
+            streams: Vec::new(),
             calls: Vec::new(),
             faults: Vec::new(),
             checksum,

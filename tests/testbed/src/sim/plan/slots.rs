@@ -33,7 +33,7 @@ impl Plan {
     }
 
     /// One of up to six nodes.
-    pub(in crate::sim) fn small_slotted(seed: u64) -> Self {
+    pub fn small_slotted(seed: u64) -> Self {
         Self::slotted_of(seed, SMALL, 3)
     }
 
@@ -63,7 +63,6 @@ impl Plan {
             oversleeps_percent: 0,
             divisions: Divisions::default(),
             joins_ns: None,
-            replicates: false,
         });
         plan.time_slots();
         plan.draw_all(chance);

@@ -8,7 +8,7 @@ use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::inbound::WINDOW;
 use rohrpost_routers::security::{PeerSessions, Port, Rejection};
 use rohrpost_routers::time::message::Sync;
-use rohrpost_routers::time::{Clock, Role, Term};
+use rohrpost_routers::time::{Clock, Ignored, Role, Term};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -98,16 +98,23 @@ impl TimeRejections {
     }
 
     /// A Sync of an incarnation that is known to live was handled. The next one of the master that a node follows is
-    /// not late.
-    pub(super) fn syncs(&mut self, io: &mut Io<'_>, clock: &Clock, head: &FrameHead, sync: &Sync, is_late: bool) {
+    /// not late. What was ignored for another reason, brought here from another node, is none of these.
+    pub(super) fn syncs(
+        &mut self,
+        io: &mut Io<'_>,
+        clock: &Clock,
+        head: &FrameHead,
+        sync: &Sync,
+        taken: Option<Result<(), Ignored>>,
+    ) {
         let said = (head.from, head.incarnation, sync.term);
         let is_next = self.synced.is_some_and(|(before, id)| before == said && sync.id > id);
         let is_followed = clock.role() == Role::Slave && clock.term() == sync.term && clock.master() == Some(head.from);
-        if is_late && is_next && is_followed {
+        if taken == Some(Err(Ignored::Late)) && is_next && is_followed {
             let text = format!("node {} ignores the next Sync of its master: {head:?}", io.node);
             io.oracle.broken(io.now, Promise::Rejection, text);
         }
-        self.synced = if is_late { self.synced } else { Some((said, sync.id)) };
+        self.synced = if taken == Some(Ok(())) { Some((said, sync.id)) } else { self.synced };
     }
 }
 

@@ -10,7 +10,7 @@ use rohrpost_routers::driver::{TimeEvent, TimeSource};
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::security::PeerSessions;
 use rohrpost_routers::time::message::TimeMessage;
-use rohrpost_routers::time::{Clock, Ignored, JOINING_SYNCS, RATE_MAX_PPB, Role, TIME_BYTES, Term, TimeEstimate};
+use rohrpost_routers::time::{Clock, JOINING_SYNCS, RATE_MAX_PPB, Role, TIME_BYTES, Term, TimeEstimate};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
@@ -135,8 +135,7 @@ impl TimeWatch {
                 if let (TimeSource::Proven, Ok(TimeMessage::Sync(sync))) = (source, TimeMessage::parse(head.kind, rest))
                     && !sync.replacement
                 {
-                    let is_late = taken == Some(Err(Ignored::Late));
-                    self.rejections.syncs(io, clock, head, &sync, is_late);
+                    self.rejections.syncs(io, clock, head, &sync, taken);
                 }
                 self.hears(io, clock, (source, taken == Some(Ok(()))), head, rest);
                 self.look(io, clock);

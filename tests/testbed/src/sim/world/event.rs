@@ -23,6 +23,10 @@ pub(in crate::sim) enum Event {
     Fixed,
     /// The next package of a flow, or the next of its burst.
     Flow { flow: usize },
+    /// The next record of a stream.
+    Write { stream: usize },
+    /// A reader of a replica looks what there is.
+    Read { reader: usize },
     /// The next call of a caller.
     Call { caller: usize },
     /// The next try of a call.

@@ -19,6 +19,7 @@ use super::link::Link;
 use super::oracle::Oracle;
 use super::plan::Plan;
 use super::promise::Problem;
+use super::replicas::{RecordBooks, Rings, Streams};
 use super::spans::{MS, RECOVERY_NS, S};
 use super::station::{Arrived, Layer, Sent, Station};
 use super::ticking;
@@ -49,6 +50,8 @@ pub struct World<'a> {
     pub(super) sequences: Vec<u32>,
     /// The books.
     pub oracle: Oracle,
+    /// The modules that write streams, and those that read them.
+    pub(super) streams: Streams,
     /// The calls.
     pub calls: Calls,
     /// What is written down.
@@ -68,8 +71,8 @@ const LOOK_NS: u64 = 50 * MS;
 const OLD_MAX: usize = 64;
 
 impl<'a> World<'a> {
-    /// A network as planned. `layers` makes routers, `guard` makes what lets commands run.
-    pub fn new(plan: Rc<Plan>, guard: NewGuard, layers: NewLayers<'a>, trace: bool) -> Self {
+    /// A network as planned. `rings`: of its nodes; `layers` makes routers, `guard` makes what lets commands run.
+    pub fn new(plan: Rc<Plan>, guard: NewGuard, rings: &Rc<Rings>, layers: NewLayers<'a>, trace: bool) -> Self {
         let mut chance = Chance::new(plan.seed ^ 0x5eed);
         let count = plan.nodes.len();
         let mut stations = Vec::new();
@@ -86,7 +89,7 @@ impl<'a> World<'a> {
             stations.push(station);
         }
         let mut oracle = Oracle::new(plan.shape.bulk_below);
-        oracle.is_sealed = plan.sealed;
+        (oracle.is_sealed, oracle.records) = (plan.sealed, RecordBooks::new(&plan.streams));
         oracle.times = Times::new(stations.iter().map(|station| station.clock.clone()).collect());
         (oracle.wire, oracle.well_ns) = (Wire::new(count), plan.fixed_ns + RECOVERY_NS);
         let mut world = Self {
@@ -97,6 +100,7 @@ impl<'a> World<'a> {
             servers,
             sequences: vec![1; count],
             oracle,
+            streams: Streams::new(&plan, rings),
             calls: Calls::default(),
             trace: Trace::new(trace),
             new_layers: layers,
@@ -130,6 +134,7 @@ impl<'a> World<'a> {
             self.at(at_ns, Event::Call { caller });
         }
         self.at(0, Event::SnapshotRequest);
+        self.schedule_streams();
     }
 
     pub(super) fn at(&mut self, at_ns: u64, event: Event) {
@@ -190,6 +195,8 @@ impl<'a> World<'a> {
             Event::End { fault } => self.end(fault),
             Event::Fixed => self.fix(),
             Event::Flow { flow } => self.flow(flow),
+            Event::Write { stream } => self.write(stream),
+            Event::Read { reader } => self.read(reader),
             Event::Call { caller } => self.call(caller),
             Event::Try { call } => self.try_call(call),
             Event::Serve { node, module } => self.serve(node, module),
