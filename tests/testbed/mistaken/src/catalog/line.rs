@@ -59,8 +59,9 @@ pub(crate) const LINE: Group = Group {
                        records_are_whole_or_told_and_the_newest_is_next_whatever_goes_wrong",
             edits: &[edit(
                 "replication/gathering.rs",
-                "self.is_open && self.missing == 0",
-                "self.is_open && self.missing <= usize::from(broken!(MissesLastPart))",
+                "(self.parts, self.missing, self.expected) = (parts, parts, parts - 1);",
+                r"let missing = parts - usize::from(broken!(MissesLastPart) && parts > 1);
+        (self.parts, self.missing, self.expected) = (parts, missing, parts - 1);",
             )],
         },
         Planted {
