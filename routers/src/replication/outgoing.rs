@@ -197,7 +197,7 @@ impl OutgoingReplica {
 
     /// Whether something waits for this destination.
     pub(super) fn waits_for(&self, to: &Destination) -> bool {
-        let is_behind = self.newest.zip(to.next).is_some_and(|(newest, next)| next <= newest.sequence);
+        let is_behind = self.newest.is_some_and(|newest| to.next.is_none_or(|next| next <= newest.sequence));
         let has_some = to.describing.is_some() || to.is_asked() || to.under_way.is_some() || is_behind;
         self.reader.is_some() && !to.is_absent && has_some
     }
