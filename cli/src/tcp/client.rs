@@ -57,6 +57,7 @@ impl Module for ClientModule {
             );
         }
         let node = context.link().borrow().participant().node().clone();
+        let replicas = ReplicaReport::new(installation, &node_name);
         let shell = ClientShell::start(ClientParts {
             node: &node,
             name: context.me(),
@@ -74,7 +75,6 @@ impl Module for ClientModule {
         })?;
         context.use_computer_clock();
         context.set_period(PERIOD);
-        let replicas = ReplicaReport::new(installation, &node_name);
         Ok(Self { shell, node: node_name, replicas, server })
     }
 

@@ -55,7 +55,7 @@ pub(crate) fn act(role: &str, ground: &Ground, arm: impl Fn()) {
                 replica.begin(begun).unwrap();
                 assert!(replica.put(begun.sequence, 0, &bytes(begun.sequence)));
             }
-            replica.finish(sequence).unwrap();
+            replica.finish(sequence, 0).unwrap();
             die_with(replica);
         }
         "read" => {

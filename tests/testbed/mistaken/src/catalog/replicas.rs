@@ -231,8 +231,9 @@ pub(crate) const RECORDS: Group = Group {
             shows_in: IN_NETWORKS,
             edits: &[edit(
                 "replication/outgoing.rs",
-                "destination.describe_ns = now_ns + DESCRIBE_EVERY_NS;",
-                "destination.describe_ns = if broken!(DescribesOnce) { u64::MAX } else { now_ns + DESCRIBE_EVERY_NS };",
+                "destination.describe_ns = now_ns + self.describe_every_ns;",
+                r"let every_ns = self.describe_every_ns;
+        destination.describe_ns = if broken!(DescribesOnce) { u64::MAX } else { now_ns + every_ns };",
             )],
         },
     ],
