@@ -49,6 +49,7 @@ const PROOFS: [Proof; 3] = [
     Proof {
         real: "real_stream",
         parts: &[
+            "stream/omission",
             "stream/ring",
             "stream/left_out",
             "stream/missed",

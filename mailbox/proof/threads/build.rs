@@ -41,7 +41,7 @@ const PROOFS: [Proof; 2] = [
     },
     Proof {
         real: "real_stream",
-        parts: &["stream/ring", "stream/left_out", "stream/writing", "stream_rig"],
+        parts: &["stream/omission", "stream/ring", "stream/left_out", "stream/writing", "stream_rig"],
         broken: &[stream_broken::BROKEN],
         caught: STREAM_CAUGHT,
     },

@@ -1,6 +1,6 @@
 //! What a reader did not get, and why.
 
-use crate::stream::left_out::{LeftOut, OmissionCause};
+use crate::stream::omission::{LeftOut, OmissionCause};
 use crate::stream::ring::Ring;
 use crate::sync::Ordering;
 

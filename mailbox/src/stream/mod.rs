@@ -1,8 +1,8 @@
 //! Streams: rings of stamped records in shared memory, each with one writer and many readers. `ring` tells how.
 //!
-//! Reading order: `ring`, `writing`, `left_out`, `missed`, `lookup` are the protocol; `shape`, `segment`, `bytes` the
-//! memory; `writer`, `replica`, `reader`, `record`, `error` what users hold; `files` which there are; `inspect` what each
-//! says of itself.
+//! Reading order: `ring`, `writing`, `omission`, `left_out`, `missed`, `lookup` are the protocol; `shape`, `segment`,
+//! `bytes` the memory; `writer`, `replica`, `reader`, `record`, `error` what users hold; `files` which there are;
+//! `inspect` what each says of itself.
 
 mod bytes;
 mod error;
@@ -11,6 +11,7 @@ mod inspect;
 mod left_out;
 mod lookup;
 mod missed;
+mod omission;
 mod reader;
 mod record;
 mod replica;

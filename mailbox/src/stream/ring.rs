@@ -37,7 +37,7 @@
 //! against publishing, (G) and (H) holding against reuse.
 
 use crate::step::step;
-use crate::stream::left_out::LeftOut;
+use crate::stream::omission::LeftOut;
 use crate::sync::{AtomicU32, AtomicU64, Ordering, fence};
 use std::cmp;
 

@@ -9,7 +9,7 @@ use crate::owned::{self, Refused};
 use crate::participant::Participant;
 use crate::step::step;
 use crate::stream::error::{StreamError, WriteError};
-use crate::stream::left_out::LeftOut;
+use crate::stream::omission::LeftOut;
 use crate::stream::record::RecordInfo;
 use crate::stream::ring::{About, Line, Seat, Stamp};
 use crate::stream::segment::StreamSegment;

@@ -8,7 +8,7 @@
 //! shared: a successor works it out from the index.
 
 use crate::step::step;
-use crate::stream::left_out::{LeftOut, OmissionCause};
+use crate::stream::omission::{LeftOut, OmissionCause};
 use crate::stream::ring::{
     About, FRAME, IndexEntry, LEFT_OUT, Look, Ring, SEQUENCE_MAX, STREAM_READERS_MAX, Seat, Stamp, ahead,
 };

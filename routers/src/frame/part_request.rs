@@ -60,8 +60,8 @@ impl PartRequest {
     }
 }
 
-/// A request as it came, in its datagram: all its claims are checked. Not read yet: few datagrams are requests, and what
-/// a datagram says is handed on by value.
+/// A request as it came, in its datagram: all its claims are checked. Not read yet: few datagrams are requests, and
+/// what a datagram says is handed on by value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PartRequestBytes<'a> {
     head: &'a [u8; HEAD_BYTES],

@@ -17,8 +17,8 @@ const ASK_BURST: u64 = 32;
 const REQUESTS_LOST_MAX: u32 = 4;
 
 /// The time from a request to the part that it asks for, by the answers so far: smoothed as TCP does (RFC 6298). Which
-/// of several requests an answer is for is not known, so it says nothing (Karn's algorithm), unless it is the first answer
-/// of all, or to very many: then it counts as one to the first request, which is too long at worst.
+/// of several requests an answer is for is not known, so it says nothing (Karn's algorithm), unless it is the first
+/// answer of all, or to very many: then it counts as one to the first request, which is too long at worst.
 #[derive(Debug, Default)]
 pub(super) struct AnswerTime {
     /// 0: no answer yet.

@@ -6,8 +6,8 @@
 //!  nothing came for an answer's time ───┘          nothing: asked again after that time, twice, four times that time
 //! ```
 //!
-//! While parts come by themselves, with whatever pauses, requests do not count: with time slots a record takes many cycles.
-//! Else it ends after [`ROUNDS_MAX`] requests, and when nothing came for the replica's deadline.
+//! While parts come by themselves, with whatever pauses, requests do not count: with time slots a record takes many
+//! cycles. Else it ends after [`ROUNDS_MAX`] requests, and when nothing came for the replica's deadline.
 
 use super::settings::ReplicaSettings;
 use crate::frame::{ASKED_PARTS_MAX, RecordPart};

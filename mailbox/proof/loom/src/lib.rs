@@ -15,7 +15,7 @@
 //! - `step.rs`: the core's crash points, here places to switch threads and to die.
 //! - `cell_models.rs`, `cell_broken.rs`: the same for the single-writer cells of `cell.rs`.
 //! - `stream_models.rs`, `stream_broken.rs`: the same for the core of streams,
-//!   `stream/{ring,writing,left_out,missed,lookup}.rs`.
+//!   `stream/{omission,ring,writing,left_out,missed,lookup}.rs`.
 //! - `build.rs`: puts them together with loom's atomics. It also compares what the models had to write again (what is
 //!   asked of the kernel, waiting, sending, giving up) with the lines that the mailbox has.
 //!

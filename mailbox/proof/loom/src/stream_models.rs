@@ -1,9 +1,9 @@
 //! The models of the core of streams. This file is compiled beside the real `stream/*.rs` and beside each broken one.
 
 use crate::step::{dies_at, reached};
-use crate::stream::left_out::LeftOut;
 use crate::stream::lookup::{Answer, around};
 use crate::stream::missed::Missed;
+use crate::stream::omission::LeftOut;
 use crate::stream::ring::{About, Look, Stamp};
 use crate::stream::writing::Progress;
 use crate::stream_rig::{Bytes, Reader, Stream, looked_at};

@@ -2,8 +2,8 @@
 //! the models.
 
 use crate::step::reached;
-use crate::stream::left_out::LeftOut;
 use crate::stream::missed::{Missed, MissedAccount};
+use crate::stream::omission::LeftOut;
 use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};
 use crate::stream::writing::Progress;
 use crate::sync::{AtomicU32, AtomicU64, Ordering};

@@ -7,7 +7,7 @@
 //!  ../loom/src/broken/, one edit each ─────┴── edited ─────▶ a data race is reported (src/caught.rs says in which run)
 //! ```
 //!
-//! The same for `mailbox/src/stream/{ring,left_out,writing}.rs`, with `src/stream_rig.rs` and
+//! The same for `mailbox/src/stream/{omission,ring,left_out,writing}.rs`, with `src/stream_rig.rs` and
 //! `../loom/src/stream_broken.rs`.
 //!
 //! `cargo xtask tsan` builds and runs this. Each run is a process of its own. The standard library is not instrumented:

@@ -6,7 +6,7 @@
 
 use crate::rounds;
 use crate::step::{dice, reached, shake};
-use crate::stream::left_out::LeftOut;
+use crate::stream::omission::LeftOut;
 use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};
 use crate::stream::writing::Progress;
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
