@@ -154,11 +154,19 @@ impl LineReplicas {
         }
     }
 
-    /// Whether something waits for a node.
-    pub fn waits_for(&self, node: NodeIndex) -> bool {
-        let all = self.destinations.iter().filter(|destination| destination.node == node);
-        let mut streams = all.flat_map(|destination| &destination.streams.streams);
-        streams.any(|stream| stream.destinations.iter().any(|to| stream.waits_for(to)))
+    /// Whether there is something to look at for a node: its next part, or records that sampling leaves out.
+    pub fn is_behind(&self, node: NodeIndex) -> bool {
+        self.streams_to(node).any(|stream| stream.destinations.iter().any(|to| stream.is_behind(to)))
+    }
+
+    /// Whether a part waits for a node.
+    pub fn waits_for(&self, now_ns: u64, node: NodeIndex) -> bool {
+        self.streams_to(node).any(|stream| stream.destinations.iter().any(|to| stream.waits_for(now_ns, to)))
+    }
+
+    fn streams_to(&self, node: NodeIndex) -> impl Iterator<Item = &OutgoingReplica> {
+        let all = self.destinations.iter().filter(move |destination| destination.node == node);
+        all.flat_map(|destination| &destination.streams.streams)
     }
 
     /// Writes the next part for a node: its kind and length. None: there is none.

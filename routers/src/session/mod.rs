@@ -72,14 +72,15 @@ pub trait ReplicaEnd {
     }
 }
 
-/// Makes the next part for a node ready, if the line has room and there is one. Whether one was made.
+/// Makes the next part for a node ready, if the line has room and there is one. Whether more wait.
 fn add_part(outgoing: &mut Outgoing, now_ns: u64, node: NodeIndex, end: &mut impl ReplicaEnd) -> bool {
     let Some(replicas) = end.replicas() else { return false };
     outgoing.add_part(LINE_PART_ROOM, |content| {
         let (kind, length) = replicas.next(now_ns, node, content)?;
         let is_record = kind == FrameKind::RecordPart;
         Some((if is_record { SessionFrameKind::RecordPart } else { SessionFrameKind::Description }, length))
-    })
+    });
+    replicas.waits_for(now_ns, node)
 }
 
 /// Writes the error replies to commands that go no further. The routers do not know how an error is encoded.

@@ -193,21 +193,20 @@ impl Outgoing {
     }
 
     /// Makes a part of a replica ready, if nothing else is and nothing waits. `write` puts what follows the frame's head
-    /// into the room that it gets, and says how long it is; none: there is none. Whether one was made.
+    /// into the room that it gets, and says how long it is; none: there is none.
     pub(super) fn add_part(
         &mut self,
         room: usize,
         write: impl FnOnce(&mut [u8]) -> Option<(SessionFrameKind, usize)>,
-    ) -> bool {
+    ) {
         if !self.ready().is_empty() || self.has_waiting() {
-            return false;
+            return;
         }
         self.forget_taken();
         self.ready.resize(HEAD_BYTES + room, 0);
         let made = write(&mut self.ready[HEAD_BYTES..]);
         self.ready.truncate(made.map_or(0, |(_, length)| HEAD_BYTES + length));
         made.into_iter().for_each(|(kind, length)| write_head(kind, length, &mut self.ready));
-        made.is_some()
     }
 
     /// Gives up what waited too long. `cause`: why it did.

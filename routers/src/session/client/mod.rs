@@ -121,7 +121,7 @@ pub struct Client {
     is_slow: bool,
     /// Parts of replicas may leave and come.
     has_line: bool,
-    /// Some may wait.
+    /// Some wait.
     has_parts: bool,
     estimate: ServerClockEstimate,
     /// The end with these clocks.

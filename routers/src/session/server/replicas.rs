@@ -11,20 +11,27 @@ impl Server {
         let Some(replicas) = host.replicas() else { return };
         replicas.refresh(now_ns);
         for (node, name) in replicas.nodes() {
-            if let Some(client) = self.table.client_of(*name).filter(|_| replicas.waits_for(*node)) {
-                self.member_mut(client).into_iter().for_each(|member| member.has_parts = true);
+            let Some(client) = self.table.client_of(*name) else { continue };
+            let waits = replicas.waits_for(now_ns, *node);
+            self.member_mut(client).into_iter().for_each(|member| member.has_parts = waits);
+            if replicas.is_behind(*node) {
                 self.is_due(client);
             }
         }
     }
 
-    /// Makes the next part for a client ready, if nothing else is.
+    /// Makes the next part for a client ready, if nothing else is, and it got none in this turn.
     pub(super) fn add_part(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) {
-        let Some(member) = self.member_mut(client).filter(|member| member.has_parts && member.is_member()) else {
+        let turn = self.turn;
+        let Some(member) = self.member_mut(client).filter(|member| member.is_member()) else { return };
+        let Some(node) = member.node.filter(|_| member.outgoing.ready().is_empty()) else { return };
+        if member.part_turn == turn {
+            self.has_put_off |= member.has_parts;
             return;
-        };
-        if let Some(node) = member.node.filter(|_| member.outgoing.ready().is_empty()) {
-            member.has_parts = add_part(&mut member.outgoing, now_ns, node, host);
+        }
+        member.has_parts = add_part(&mut member.outgoing, now_ns, node, host);
+        if !member.outgoing.ready().is_empty() {
+            member.part_turn = turn;
         }
     }
 

@@ -1,6 +1,7 @@
 //! Replicas by sessions, in simulated networks and with hostile ends.
 
 mod hostile;
+mod turns;
 
 use super::plan::Plan;
 use super::world::rings::{PICTURE, POSE};

@@ -149,7 +149,7 @@ impl Rings {
         self.writers.iter().find(|(of, ..)| *of == place).map_or(0, |(.., written)| *written)
     }
 
-    fn write(&mut self, now_ms: u64) -> bool {
+    pub(in crate::session::tests) fn write(&mut self, now_ms: u64) -> bool {
         let mut has_written = false;
         for (place, writer, written) in &mut self.writers {
             if now_ms.is_multiple_of(STREAMS[*place].4) {
