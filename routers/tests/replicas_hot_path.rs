@@ -95,7 +95,7 @@ struct End {
 impl End {
     fn new(node: &Arc<Node>, settings: &Settings, replica: &ReplicaSettings) -> Self {
         let replicas = std::slice::from_ref(replica);
-        let sender = ReplicaSender::new(settings, replicas);
+        let mut sender = ReplicaSender::new(settings, replicas);
         let receiver = ReplicaReceiver::new(settings, replicas, join(node), Arc::new(Always));
         Self {
             parts: Parts(receiver.asking_by(sender.requests()), BEGIN_NS),

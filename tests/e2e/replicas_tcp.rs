@@ -173,7 +173,7 @@ fn a_laptop_has_whole_pictures_and_fresh_poses_by_a_line_that_is_too_narrow_and_
     assert!(told.iter().all(|[newest, told]| *told == newest + 1), "each is read or told as lost: {told:?}");
     let [pictures, poses, back] = [0, 1, 2].map(|at: usize| laptop.streams[at].3.records);
     eprintln!("{pictures} pictures, {poses} poses, {back} poses back");
-    assert!(pictures >= 3 && pictures < PICTURES, "the line is too narrow for all, and wide enough for some");
+    assert!((3..PICTURES).contains(&pictures), "the line is too narrow for all, and wide enough for some");
     assert!(poses >= POSES_A_PICTURE * pictures, "{poses} poses beside {pictures} pictures");
     for (stream, [from, to], records) in [
         (STREAMS[0], ["base", "far"], pictures),

@@ -121,7 +121,7 @@ impl ReplicaWriter {
     }
 
     /// The record of this sequence, if it is begun.
-    pub fn begun(&self, sequence: u64) -> Option<OriginRecord> {
+    fn begun(&self, sequence: u64) -> Option<OriginRecord> {
         self.begun.iter().flatten().map(|begun| begun.record).find(|record| record.sequence == sequence)
     }
 

@@ -113,6 +113,7 @@ impl StreamSegment {
 
     /// Whether it is a replica, which may begin with any sequence.
     pub(crate) fn is_replica(&self) -> bool {
+        // ORDERING: Relaxed; it goes along with nothing: whichever writer said it, a reader begins as with that one.
         self.page.writer.replica.load(Ordering::Relaxed) != 0
     }
 

@@ -146,6 +146,7 @@ impl Progress {
         old.into_iter().for_each(|frame| expect(frame as usize));
         prefetch_to_write(ring.entry(sequence + 1));
         step!("publish: filled");
+        // ORDERING: Relaxed; a hint is believed only as far as the entry says the same.
         hint.store(newest.ns, Ordering::Relaxed);
         entry.write(sequence, frame.number(), &About { before_ns, left_out: self.left_out, ..about });
         self.next = sequence + 1;

@@ -340,8 +340,8 @@ pub struct ReplicaState {
 pub struct ReplicaCause {
     /// In a word. Of records: `sampled`, `passed`, `absent` where they are sent, `incomplete` where they come. Of parts
     /// that were not taken: `duplicate`, `late`, `foreign`, `undescribed`, `too-large`, `unsound`, `unwritable`. Of
-    /// requests for parts: `overwritten`, `not-sent`, `out-of-range`; of parts that are asked for again and again
-    /// `exhausted`.
+    /// requests for parts: `overwritten`, `not-sent`, `out-of-range`, `crowded`; of parts that are asked for again and
+    /// again `exhausted`.
     pub cause: String,
     /// How many.
     pub times: u64,

@@ -367,7 +367,7 @@ mod tests {
         for (code, tag) in (1..).zip(ALL) {
             assert_eq!((tag as u8, Tag::from_code(code)), (code, Some(tag)));
         }
-        assert_eq!((Tag::from_code(0), Tag::from_code(37)), (None, None));
+        assert_eq!((Tag::from_code(0), Tag::from_code(38)), (None, None));
     }
 
     #[test]

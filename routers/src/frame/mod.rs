@@ -21,7 +21,7 @@ mod replica;
 
 use fields::long;
 pub use fields::{BadFrame, VERSION};
-pub use part_request::{ASKED_PARTS_MAX, PART_REQUEST_BYTES_MAX, PartRequest};
+pub use part_request::{ASKED_PARTS_MAX, PART_REQUEST_BYTES_MAX, PartRequest, PartRequestBytes};
 pub use refusal::{Refusal, RefusalReason};
 pub use replica::{DESCRIPTION_BYTES_MAX, DESCRIPTION_PART_HEAD_BYTES, DescriptionPart, RecordPart, ReplicaFrame};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
@@ -247,7 +247,7 @@ impl<'a> Frame<'a> {
             FrameKind::Refusal => Self::Refusal(Refusal::parse(version, rest)?),
             FrameKind::RecordPart => Self::Replica(ReplicaFrame::Record(RecordPart::parse(rest)?)),
             FrameKind::Description => Self::Replica(ReplicaFrame::Description(DescriptionPart::parse(rest)?)),
-            FrameKind::PartRequest => Self::Replica(ReplicaFrame::Request(PartRequest::parse(rest)?)),
+            FrameKind::PartRequest => Self::Replica(ReplicaFrame::Request(PartRequestBytes::parse(rest)?)),
             FrameKind::Hello => return Err(BadFrame::Damaged("a hello that is not sealed")),
             FrameKind::Sync | FrameKind::WarmUp | FrameKind::Request | FrameKind::Reply => Self::Time(rest),
         })

@@ -45,28 +45,6 @@ impl PartRequest {
         HEAD_BYTES + 8 * words
     }
 
-    pub(super) fn parse(rest: &[u8]) -> Result<Self, BadFrame> {
-        let Some((b, words)) = rest.split_first_chunk::<HEAD_BYTES>() else {
-            return Err(BadFrame::Damaged("a request for parts is cut short"));
-        };
-        let (words, odd) = words.as_chunks::<8>();
-        if !odd.is_empty() || words.is_empty() || words.len() > WORDS_MAX || words.last() == Some(&[0; 8]) {
-            return Err(BadFrame::Damaged("a request for parts names none, or too many"));
-        }
-        let mut parts = [0; WORDS_MAX];
-        parts.iter_mut().zip(words).for_each(|(into, word)| *into = u64::from_le_bytes(*word));
-        let request = Self {
-            place: half(b, 0),
-            generation: half(b, 2),
-            first: word(b, 4),
-            router: long(b, 8),
-            sequence: long(b, 16),
-            parts,
-        };
-        let is_countable = request.first.checked_add(ASKED_PARTS_MAX as u32).is_some();
-        if is_countable { Ok(request) } else { Err(BadFrame::Damaged("a request for parts that no record has")) }
-    }
-
     /// The indices of the parts that it names, in order.
     pub fn asked(&self) -> impl Iterator<Item = usize> + use<> {
         let Self { first, parts, .. } = *self;
@@ -79,6 +57,52 @@ impl PartRequest {
             })
         };
         parts.into_iter().enumerate().flat_map(of_word)
+    }
+}
+
+/// A request as it came, in its datagram: all its claims are checked. Not read yet: few datagrams are requests, and what
+/// a datagram says is handed on by value.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct PartRequestBytes<'a> {
+    head: &'a [u8; HEAD_BYTES],
+    words: &'a [[u8; 8]],
+}
+
+impl<'a> PartRequestBytes<'a> {
+    pub(crate) fn parse(rest: &'a [u8]) -> Result<Self, BadFrame> {
+        let Some((head, words)) = rest.split_first_chunk::<HEAD_BYTES>() else {
+            return Err(BadFrame::Damaged("a request for parts is cut short"));
+        };
+        let (words, odd) = words.as_chunks::<8>();
+        if !odd.is_empty() || words.is_empty() || words.len() > WORDS_MAX || words.last() == Some(&[0; 8]) {
+            return Err(BadFrame::Damaged("a request for parts names none, or too many"));
+        }
+        let is_countable = word(head, 4).checked_add(ASKED_PARTS_MAX as u32).is_some();
+        if is_countable {
+            Ok(Self { head, words })
+        } else {
+            Err(BadFrame::Damaged("a request for parts that no record has"))
+        }
+    }
+
+    /// Place of the replica in the configuration, from 0.
+    pub fn place(&self) -> u16 {
+        half(self.head, 0)
+    }
+
+    /// What it says.
+    pub fn read(&self) -> PartRequest {
+        let Self { head, words } = self;
+        let mut parts = [0; WORDS_MAX];
+        parts.iter_mut().zip(*words).for_each(|(into, word)| *into = u64::from_le_bytes(*word));
+        PartRequest {
+            place: self.place(),
+            generation: half(head, 2),
+            first: word(head, 4),
+            router: long(head, 8),
+            sequence: long(head, 16),
+            parts,
+        }
     }
 }
 
@@ -98,7 +122,7 @@ mod tests {
         let head = FrameHead { kind, system: 1, from: 2, to: 3, digest: 4, incarnation: 5, sequence: 6 };
         let datagram = [&head.to_bytes(&[rest])[..], rest].concat();
         match Frame::parse(&datagram)?.1 {
-            Frame::Replica(ReplicaFrame::Request(request)) => Ok(request),
+            Frame::Replica(ReplicaFrame::Request(request)) => Ok(request.read()),
             other => panic!("{other:?}"),
         }
     }

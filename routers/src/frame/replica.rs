@@ -1,8 +1,8 @@
 //! Parts of what a replica needs: of records, and of the description of the module that writes them. What a node asks
-//! for again says [`PartRequest`].
+//! for again says [`PartRequest`](super::PartRequest).
 
 use super::fields::{BadFrame, half, long, word};
-use super::part_request::PartRequest;
+use super::part_request::PartRequestBytes;
 use rohrpost_network::RECORD_PART_HEAD_BYTES;
 
 /// Bytes between the head of the datagram and a description's bytes.
@@ -18,7 +18,7 @@ pub enum ReplicaFrame<'a> {
     /// A part of the description of the module that writes the stream.
     Description(DescriptionPart<'a>),
     /// A node asks for parts of a record again.
-    Request(PartRequest),
+    Request(PartRequestBytes<'a>),
 }
 
 impl ReplicaFrame<'_> {
@@ -27,7 +27,7 @@ impl ReplicaFrame<'_> {
         match self {
             Self::Record(part) => part.place,
             Self::Description(part) => part.place,
-            Self::Request(request) => request.place,
+            Self::Request(request) => request.place(),
         }
     }
 }

@@ -22,6 +22,8 @@ rohrpost_mailbox::causes! {
         OutOfRange = "out-of-range",
         /// Sender, parts: asked for again and again.
         Exhausted = "exhausted",
+        /// Sender, requests: that node asks faster than it is answered.
+        Crowded = "crowded",
         /// Receiver, records: a part of it, or all, never came.
         Incomplete = "incomplete",
         /// Receiver, parts: of a record that came before, whole.
@@ -52,6 +54,7 @@ impl ReplicaLosses {
         self.0[cause as usize].get()
     }
 
+    /// Each cause is counted by one thread alone.
     pub(super) fn add(&self, cause: ReplicaLoss, more: u64) {
         self.0[cause as usize].add(more);
     }

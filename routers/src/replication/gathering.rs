@@ -6,7 +6,8 @@
 //!  nothing came for an answer's time ───┘          nothing: asked again after that time, twice, four times that time
 //! ```
 //!
-//! It ends after [`ROUNDS_MAX`] requests, and when nothing came for the replica's deadline.
+//! While parts come by themselves, with whatever pauses, requests do not count: with time slots a record takes many cycles.
+//! Else it ends after [`ROUNDS_MAX`] requests, and when nothing came for the replica's deadline.
 
 use super::settings::ReplicaSettings;
 use crate::frame::{ASKED_PARTS_MAX, RecordPart};
@@ -75,14 +76,23 @@ pub(super) struct Gathering {
     missing: usize,
     /// The last part that is expected to come.
     expected: usize,
+    /// Behind the last part that came.
+    reached: usize,
+    /// The longest time between two parts, ns, while new ones come by themselves: with time slots about a cycle.
+    gap_ns: u64,
+    /// A newer record arrives, so nothing more comes of this one by itself.
+    is_passed: bool,
     /// When a part came that was missing, or it was opened, ns.
     came_ns: u64,
     /// Time between parts that come one after the other, smoothed, ns.
     pace_ns: u64,
     asked_ns: u64,
-    /// Requests so far, and of these since the last missing part came.
+    /// The first of the requests in vain, ns.
+    first_asked_ns: u64,
+    /// Requests since it came further by itself, and of these since the last missing part came.
     rounds: u32,
     in_vain: u32,
+    was_asked: bool,
     /// It is time to ask.
     is_due: bool,
 }
@@ -99,11 +109,16 @@ impl Gathering {
             parts: 0,
             missing: 0,
             expected: 0,
+            reached: 0,
+            gap_ns: 0,
+            is_passed: false,
             came_ns: 0,
             pace_ns: 0,
             asked_ns: 0,
+            first_asked_ns: 0,
             rounds: 0,
             in_vain: 0,
+            was_asked: false,
             is_due: false,
         }
     }
@@ -118,12 +133,13 @@ impl Gathering {
     pub(super) fn open_seen(&mut self, now_ns: u64, arriving: Arriving, life: Life, part_bytes: usize) {
         let rounds = if self.is_unseen(arriving.record.sequence, life) { self.rounds } else { 0 };
         let parts = arriving.record.len_bytes.div_ceil(part_bytes).max(1);
-        let asked = (self.asked_ns, self.in_vain);
+        let asked = (self.asked_ns, self.first_asked_ns, self.in_vain);
         self.open(now_ns, arriving.record.sequence, life, parts);
         (self.arriving, self.rounds) = (Some(arriving), rounds);
         if rounds > 0 {
             // Of a record that was asked for nothing comes by itself.
-            ((self.asked_ns, self.in_vain), self.expected) = (asked, 0);
+            ((self.asked_ns, self.first_asked_ns, self.in_vain), self.expected) = (asked, 0);
+            (self.was_asked, self.is_passed) = (true, true);
         }
     }
 
@@ -131,8 +147,9 @@ impl Gathering {
         (self.is_open, self.sequence, self.life, self.arriving) = (true, sequence, life, None);
         self.came[..parts.div_ceil(64)].fill(0);
         (self.parts, self.missing, self.expected) = (parts, parts, parts - 1);
-        (self.came_ns, self.pace_ns, self.asked_ns) = (now_ns, 0, 0);
-        (self.rounds, self.in_vain, self.is_due) = (0, 0, false);
+        (self.came_ns, self.pace_ns, self.asked_ns, self.first_asked_ns) = (now_ns, 0, 0, 0);
+        (self.reached, self.gap_ns, self.is_passed) = (0, 0, false);
+        (self.rounds, self.in_vain, self.was_asked, self.is_due) = (0, 0, false, false);
     }
 
     pub(super) fn close(&mut self) {
@@ -160,7 +177,7 @@ impl Gathering {
 
     /// Whether parts of it were asked for.
     pub(super) fn was_asked(&self) -> bool {
-        self.rounds > 0
+        self.was_asked
     }
 
     /// Whether a part came before.
@@ -168,22 +185,30 @@ impl Gathering {
         self.came[index / 64] & 1 << (index % 64) != 0
     }
 
-    /// A part came that was missing. How long that took since the only request for it, ns.
-    pub(super) fn note(&mut self, now_ns: u64, index: usize) -> Option<u64> {
+    /// A part came that was missing. If it was asked for: how long that took since the first request, ns, and
+    /// how many there were.
+    pub(super) fn note(&mut self, now_ns: u64, index: usize) -> Option<(u64, u32)> {
+        let since_ns = now_ns.saturating_sub(self.came_ns);
         self.came[index / 64] |= 1 << (index % 64);
         self.missing -= 1;
         self.is_due |= index == self.expected;
         if self.in_vain == 0 {
-            self.pace_ns = (7 * self.pace_ns + now_ns.saturating_sub(self.came_ns)) / 8;
+            self.pace_ns = (7 * self.pace_ns + since_ns) / 8;
         }
-        let took_ns = (self.in_vain == 1).then(|| now_ns.saturating_sub(self.asked_ns));
+        let is_answer = self.in_vain > 0 && (index < self.reached || self.is_passed);
+        let answer = is_answer.then(|| (now_ns.saturating_sub(self.first_asked_ns), self.in_vain));
+        if index >= self.reached && !self.is_passed {
+            // It comes further by itself, so what was asked for until now was asked for too early.
+            (self.reached, self.rounds) = (index + 1, 0);
+            self.gap_ns = self.gap_ns.max(since_ns);
+        }
         (self.came_ns, self.in_vain) = (now_ns, 0);
-        took_ns
+        answer
     }
 
     /// A newer record arrives: what did not come of this one by now has been lost.
     pub(super) fn is_passed(&mut self) {
-        self.is_due = true;
+        (self.is_due, self.is_passed) = (true, true);
     }
 
     /// Whether there is no use in asking, or in asking again.
@@ -191,10 +216,17 @@ impl Gathering {
         now_ns.saturating_sub(self.came_ns) >= deadline_ns || self.rounds >= ROUNDS_MAX
     }
 
-    /// Whether it is time to ask. An answer takes `patience_ns`.
-    pub(super) fn is_due(&self, now_ns: u64, (deadline_ns, patience_ns): (u64, u64)) -> bool {
-        // On a slow wire parts come with pauses of their own.
-        let waited_ns = (patience_ns << self.in_vain.saturating_sub(1).min(8)) + 4 * self.pace_ns;
+    /// When that was asked for first of which nothing has come yet, ns, and how often.
+    pub(super) fn asked_in_vain(&self) -> Option<(u64, u32)> {
+        (self.in_vain > 0).then_some((self.first_asked_ns, self.in_vain))
+    }
+
+    /// Whether it is time to ask. An answer takes `answer_ns`.
+    pub(super) fn is_due(&self, now_ns: u64, (deadline_ns, answer_ns): (u64, u64)) -> bool {
+        // On a slow wire parts come with pauses of their own, and with time slots in one slot a cycle.
+        let comes_by_itself = !self.is_passed && self.reached < self.parts;
+        let gap_ns = if comes_by_itself { 2 * self.gap_ns } else { 0 };
+        let waited_ns = ((answer_ns << self.in_vain.saturating_sub(1).min(8)) + 4 * self.pace_ns).max(gap_ns);
         let is_quiet = now_ns.saturating_sub(self.came_ns.max(self.asked_ns)) >= waited_ns;
         let is_missing = self.is_open && self.missing > 0;
         is_missing && (self.is_due || is_quiet) && !self.is_given_up(now_ns, deadline_ns)
@@ -217,7 +249,11 @@ impl Gathering {
     /// Parts up to this one were asked for.
     pub(super) fn asked(&mut self, now_ns: u64, last: usize) {
         (self.asked_ns, self.expected, self.is_due) = (now_ns, last, false);
+        if self.in_vain == 0 {
+            self.first_asked_ns = now_ns;
+        }
         self.rounds += 1;
         self.in_vain += 1;
+        self.was_asked = true;
     }
 }

@@ -12,18 +12,20 @@
 //! says how far behind it is: so what the sender left out on purpose is never asked for.
 
 mod due;
+mod ending;
 
+use super::answer_time::{AnswerTime, Unanswered};
 use super::counts::{ReceivedReplica, ReplicaLoss};
 use super::delay::DelayAlarm;
 use super::description::{DescriptionAssembly, KnownOrigin};
 use super::gathering::{Arriving, Gathering, Life};
-use super::patience::Patience;
-use super::requests::PartRequests;
+use super::requests::OutgoingRequest;
 use super::settings::ReplicaSettings;
 use crate::frame::RecordPart;
 use rohrpost_mailbox::{
     OriginRecord, Participant, ReplicaError, ReplicaWriter, STREAM_SEQUENCE_MAX, StreamId, SystemTime,
 };
+use rtrb::Producer;
 use std::sync::Arc;
 
 /// Places of open records. There is an older one only beside a newer one.
@@ -61,11 +63,13 @@ pub(super) struct IncomingReplica {
     given_up: Option<(Life, u64)>,
     /// When the newer one was whole, ns.
     whole_ns: u64,
-    patience: Patience,
+    answer_time: AnswerTime,
+    /// What was asked for of a record that was given up since: a part of it may still come.
+    unanswered: Option<Unanswered>,
     /// The ring could not be opened or made, and is not tried again before, ns.
     retry_ns: u64,
     /// None: nothing is asked for.
-    requests: Option<Arc<PartRequests>>,
+    requests: Option<Producer<OutgoingRequest>>,
     /// A request waits to be sent.
     pub(super) has_asked: bool,
     /// What is wrong with it was told.
@@ -89,7 +93,8 @@ impl IncomingReplica {
             open: std::array::from_fn(|_| Gathering::new(replica, part_bytes)),
             given_up: None,
             whole_ns: 0,
-            patience: Patience::default(),
+            answer_time: AnswerTime::default(),
+            unanswered: None,
             retry_ns: 0,
             requests: None,
             has_asked: false,
@@ -99,8 +104,8 @@ impl IncomingReplica {
     }
 
     /// From now on missing parts are asked for, unless the configuration says never.
-    pub(super) fn ask_by(&mut self, requests: &Arc<PartRequests>) {
-        self.requests = Some(requests.clone()).filter(|_| self.settings.deadline_ns > 0);
+    pub(super) fn ask_by(&mut self, requests: Producer<OutgoingRequest>) {
+        self.requests = Some(requests).filter(|_| self.settings.deadline_ns > 0);
     }
 
     pub(super) fn tell(&mut self, why: &str) {
@@ -196,8 +201,7 @@ impl IncomingReplica {
                 return None;
             }
             if is_behind || !self.is_anew(life, record.sequence, next) {
-                self.lose(ReplicaLoss::Late);
-                return None;
+                return self.late(now.ns, life, record.sequence);
             }
         }
         if is_behind {
@@ -212,13 +216,15 @@ impl IncomingReplica {
             self.make_room(now);
         }
         if record.sequence < next {
-            self.writer = None;
+            self.close_ring();
         }
         let mut written = self.write(now.participant, id, record);
         if matches!(written, Err(Some(_))) && self.writer.is_some() && self.life != Some(life) {
             // Its time may have begun anew, too: what is there then fits no more.
-            self.writer = None;
-            let _ = now.participant.node().remove_orphan_stream(id);
+            self.close_ring();
+            if let Err(error) = now.participant.node().remove_orphan_stream(id) {
+                self.tell(&format!("its ring of an earlier time cannot be removed: {error}"));
+            }
             written = self.write(now.participant, id, record);
         }
         if let Err(why) = written {
@@ -230,9 +236,12 @@ impl IncomingReplica {
             return self.refuse(why);
         }
         self.open[NEWER].open_seen(now.ns, arriving, life, self.part_bytes);
-        let before = record.sequence.saturating_sub(step.into());
-        let is_lost = step > 0 && self.writer.as_ref().is_some_and(|writer| before >= writer.next());
-        if is_lost && self.requests.is_some() && !self.open[OLDER].is_open() {
+        let before = record.sequence.checked_sub(step.into()).filter(|_| step > 0);
+        let is_lost = |before: &u64| self.writer.as_ref().is_some_and(|writer| *before >= writer.next());
+        if let Some(before) = before.filter(is_lost)
+            && self.requests.is_some()
+            && !self.open[OLDER].is_open()
+        {
             self.open[OLDER].open_unseen(now.ns, before, life);
         }
         Some(NEWER)
@@ -244,14 +253,24 @@ impl IncomingReplica {
         let has_room = !older.is_open() || older.is_unseen(record.sequence, life);
         let is_over = self.given_up.is_some_and(|(of, newest)| of == life && record.sequence <= newest);
         if !has_room || is_over || record.sequence == self.open[NEWER].sequence || self.requests.is_none() {
-            self.lose(ReplicaLoss::Late);
-            return None;
+            return self.late(now.ns, life, record.sequence);
         }
         if let Err(why) = self.write(now.participant, id, record) {
+            if why.is_none() {
+                // Readers hold all frames but one, so no answer can be taken: nothing waits for one.
+                self.give_up(OLDER);
+                self.publish_if_whole(now);
+            }
             return self.refuse(why);
         }
         self.open[OLDER].open_seen(now.ns, arriving, life, self.part_bytes);
         Some(OLDER)
+    }
+
+    /// The ring is opened anew for the next record; frames of open ones are its frames.
+    fn close_ring(&mut self) {
+        self.give_up(OLDER);
+        self.writer = None;
     }
 
     /// A record was not begun; why, if not for lack of room.
@@ -259,28 +278,6 @@ impl IncomingReplica {
         self.lose(if why.is_some() { ReplicaLoss::Unwritable } else { ReplicaLoss::Late });
         why.into_iter().for_each(|why| self.tell(&why));
         None
-    }
-
-    /// A third record begins: the older is given up, and the newer is the older one from now on.
-    fn make_room(&mut self, now: Now<'_>) {
-        self.give_up(OLDER);
-        if self.open[NEWER].is_whole() {
-            self.publish(now, NEWER);
-        } else if self.requests.is_some() {
-            self.open.swap(OLDER, NEWER);
-            self.open[OLDER].is_passed();
-        } else {
-            self.give_up(NEWER);
-        }
-    }
-
-    /// Nothing is waited for any more.
-    fn settle(&mut self, now: Now<'_>) {
-        self.give_up(OLDER);
-        if self.open[NEWER].is_whole() {
-            self.publish(now, NEWER);
-        }
-        self.give_up(NEWER);
     }
 
     /// Begins a record in the ring, which is opened if it is not yet; or why that is not possible, with no writer if it
@@ -299,12 +296,10 @@ impl IncomingReplica {
             }
         };
         let mut begun = writer.begin(record);
-        let older = &mut self.open[OLDER];
+        let older = &self.open[OLDER];
         if matches!(begun, Err(ReplicaError::Begun(_))) && older.is_open() && older.sequence < record.sequence {
             writer.give_up(older.sequence);
-            older.close();
-            self.given_up = Some((older.life, older.sequence));
-            self.counts.lost.add(ReplicaLoss::Incomplete, 1);
+            self.give_up(OLDER);
             begun = writer.begin(record);
         }
         self.writer = Some(writer);
@@ -329,7 +324,9 @@ impl IncomingReplica {
         if open.has(index) || !writer.put(open.sequence, offset, bytes) {
             return self.lose(ReplicaLoss::Duplicate);
         }
-        open.note(now.ns, index).into_iter().for_each(|took_ns| self.patience.answered(took_ns));
+        if let Some((took_ns, requests)) = open.note(now.ns, index) {
+            self.answer_time.answered(took_ns, requests);
+        }
         if !open.is_whole() {
             return;
         }
@@ -338,40 +335,6 @@ impl IncomingReplica {
             return;
         }
         self.publish(now, at);
-        if at == OLDER && self.open[NEWER].is_whole() {
-            self.publish(now, NEWER);
-        }
-    }
-
-    /// Makes a record that is whole the newest of the ring.
-    fn publish(&mut self, now: Now<'_>, at: usize) {
-        let open = &mut self.open[at];
-        let (Some(arriving), Some(writer)) = (open.arriving, &mut self.writer) else { return open.close() };
-        let (record, next) = (arriving.record, writer.next());
-        open.close();
-        let before = self.sampled.filter(|_| self.life == Some(open.life));
-        let sampled = before.map_or(0, |before| arriving.sampled.wrapping_sub(before));
-        if let Err(why) = writer.finish(record.sequence, sampled.into()) {
-            self.tell(&why.to_string());
-            return self.lose(ReplicaLoss::Unwritable);
-        }
-        let (open, counts) = (&self.open[at], &*self.counts);
-        counts.gaps.add(record.sequence.saturating_sub(next));
-        counts.records.add(1);
-        counts.bytes.add(record.len_bytes as u64);
-        counts.completed.add(open.was_asked().into());
-        (self.life, self.sampled) = (Some(open.life), Some(arriving.sampled));
-        self.delays.note(now.ns, &(now.system)(), &arriving, (&self.settings, counts));
-    }
-
-    /// Gives up what is open at a place: it is left out.
-    fn give_up(&mut self, at: usize) {
-        let open = &mut self.open[at];
-        if open.is_open() {
-            self.writer.iter_mut().for_each(|writer| writer.give_up(open.sequence));
-            open.close();
-            self.given_up = Some((open.life, open.sequence));
-            self.lose(ReplicaLoss::Incomplete);
-        }
+        self.publish_if_whole(now);
     }
 }

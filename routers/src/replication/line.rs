@@ -1,4 +1,4 @@
-//! Replicas by a session: a line on which nothing is lost while it is up, and which may be slow, such as a laptop's Wi-Fi.
+//! Replicas by a session: a line on which nothing is lost while it is up, and which may be slow, as a laptop's Wi-Fi.
 //!
 //! ```text
 //!  ring of the server's node ─▶ part by part, when the line has room ═ TCP ═▶ ReplicaReceiver ─▶ ring there

@@ -19,7 +19,7 @@
 //!   one request for a lost pose, and delays the next pose by one round trip.
 //! - It asks when the last part that is expected came, when a newer record begins, or when nothing came for the time
 //!   that an answer takes, measured; again after that time, then twice, then four times that time. At most 32 times for
-//!   a record, and at most 500 requests a second for a replica.
+//!   a record after the last part of it that came by itself, and at most 500 requests a second for a replica.
 //! - The sender sends asked parts before new ones of the same stream, at its level, and as all parts do. It takes them
 //!   from the ring, of the last 32 records that it sent to that node. All parts of a record in sum leave again at most
 //!   as often as it has parts, and eight times more. Parts that have not left yet are not sent twice. Of a record that
@@ -30,6 +30,7 @@
 //! is none.
 
 mod again;
+mod answer_time;
 mod by_level;
 mod counts;
 mod delay;
@@ -40,7 +41,6 @@ mod gathering;
 mod incoming;
 mod line;
 mod outgoing;
-mod patience;
 mod peers;
 mod receiving;
 mod requests;

@@ -7,7 +7,7 @@ use super::counts::{ReceivedReplica, ReplicaLoss};
 use super::description::KnownOrigin;
 use super::gathering::Life;
 use super::incoming::{IncomingReplica, Now};
-use super::requests::PartRequests;
+use super::requests::{IncomingRequests, PartRequests, RequestFate};
 use super::settings::ReplicaSettings;
 use super::{Describe, LINE_PART_BYTES, part_bytes};
 use crate::frame::{DescriptionPart, FrameHead, NodeIndex, ReplicaFrame};
@@ -24,8 +24,8 @@ pub struct ReplicaReceiver {
     describe: Arc<dyn Describe>,
     /// By place in the configuration; none: this node has no such replica.
     streams: Vec<Option<IncomingReplica>>,
-    /// To the thread that sends; none: nothing is asked for, and nothing sent again.
-    requests: Option<Arc<PartRequests>>,
+    /// Of other nodes, to the thread that sends; none: nothing is sent again.
+    requests: Option<IncomingRequests>,
     /// Something is waited for.
     waits: bool,
     look_ns: u64,
@@ -69,11 +69,14 @@ impl ReplicaReceiver {
     }
 
     /// From now on parts that are missing are asked for, and requests of other nodes are taken. The sending half has
-    /// the other ends of these queues.
+    /// the other ends of these rings.
     #[must_use]
-    pub fn asking_by(mut self, requests: &Arc<PartRequests>) -> Self {
-        self.streams.iter_mut().flatten().for_each(|stream| stream.ask_by(requests));
-        self.requests = Some(requests.clone());
+    pub fn asking_by(mut self, requests: PartRequests) -> Self {
+        let PartRequests { outgoing, incoming } = requests;
+        for (stream, ring) in self.streams.iter_mut().zip(outgoing) {
+            stream.iter_mut().zip(ring).for_each(|(stream, ring)| stream.ask_by(ring));
+        }
+        self.requests = Some(incoming);
         self
     }
 
@@ -103,9 +106,10 @@ impl ReplicaReceiver {
         frame: &ReplicaFrame<'_>,
     ) -> bool {
         if let ReplicaFrame::Request(request) = frame {
-            let is_taken = self.requests.as_ref().is_some_and(|requests| requests.came(from, request));
-            self.rings |= is_taken;
-            return is_taken;
+            let Some(requests) = &mut self.requests else { return false };
+            let fate = requests.came(from, request);
+            self.rings |= fate == RequestFate::Waits;
+            return fate != RequestFate::Refused;
         }
         let Some(Some(stream)) = self.streams.get_mut(usize::from(frame.place())) else { return false };
         if stream.settings.node != from {

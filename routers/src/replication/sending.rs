@@ -8,7 +8,7 @@
 use super::by_level::StreamsByLevel;
 use super::counts::SentReplica;
 use super::outgoing::OutgoingReplica;
-use super::requests::{OwnRequests, PartRequests};
+use super::requests::{PartRequests, RequestPlan, SentRequests};
 use super::settings::ReplicaSettings;
 use super::{Describe, part_bytes};
 use crate::frame::{self, NodeIndex, RECORD_PART_HEAD_BYTES};
@@ -44,7 +44,8 @@ pub struct ReplicaSender {
     part_bytes: usize,
     /// Incarnation of this router.
     incarnation: u64,
-    own_requests: OwnRequests,
+    plan: RequestPlan,
+    requests: SentRequests,
     /// The nodes that such requests go to, one bit each.
     origins: u64,
     by_level: StreamsByLevel,
@@ -59,8 +60,8 @@ impl ReplicaSender {
         let by_level = StreamsByLevel::new(streams.collect());
         let here = replicas.iter().filter(|replica| replica.to & 1 << settings.own != 0);
         let origins = here.fold(0, |all, replica| all | 1 << replica.node) & !(1 << settings.own);
-        let own_requests = OwnRequests::new(PartRequests::new(settings, replicas));
-        Self { part_bytes, incarnation: settings.incarnation, own_requests, origins, by_level }
+        let (plan, requests) = (RequestPlan::new(settings, replicas), SentRequests::default());
+        Self { part_bytes, incarnation: settings.incarnation, plan, requests, origins, by_level }
     }
 
     /// Whether no stream of this node has a replica, and this one has none.
@@ -68,9 +69,12 @@ impl ReplicaSender {
         self.by_level.streams.is_empty() && self.origins == 0
     }
 
-    /// The queues between this half and [`ReplicaReceiver::asking_by`](super::ReplicaReceiver::asking_by).
-    pub fn requests(&self) -> &Arc<PartRequests> {
-        self.own_requests.queues()
+    /// Rings between this half and [`ReplicaReceiver::asking_by`](super::ReplicaReceiver::asking_by): that one's ends.
+    /// What was there before is for nobody.
+    pub fn requests(&mut self) -> PartRequests {
+        let (receiving, sending) = self.plan.rings(self.counts());
+        self.requests = sending;
+        receiving
     }
 
     /// The nodes that something goes to, one bit each.
@@ -90,14 +94,11 @@ impl ReplicaSender {
         self.by_level.streams.iter_mut().for_each(|stream| stream.look(participant, describe));
     }
 
-    /// The streams that are read, to sleep until there is a record.
-    pub fn readers(&mut self) -> Vec<&mut StreamReader> {
-        self.by_level
-            .streams
-            .iter_mut()
-            .filter(|stream| !stream.is_stalled)
-            .filter_map(|stream| stream.reader.as_mut())
-            .collect()
+    /// The streams that are read, to sleep until there is a record, and whether a request waits.
+    pub fn waits_on(&mut self) -> (Vec<&mut StreamReader>, impl Fn() -> bool + '_) {
+        let Self { by_level, requests, .. } = self;
+        let awaited = by_level.streams.iter_mut().filter(|stream| !stream.is_stalled);
+        (awaited.filter_map(|stream| stream.reader.as_mut()).collect(), || !requests.is_empty())
     }
 
     /// The next datagram, or when to ask again. `datagram` has room for the largest; `system` tells system time at a
@@ -113,7 +114,7 @@ impl ReplicaSender {
         datagram: &mut [u8],
     ) -> ReplicaStep {
         self.by_level.refresh(now_ns, outbound);
-        for (from, request) in self.own_requests.queues().take_next() {
+        for (from, request) in self.requests.take_next() {
             let stream = self.by_level.streams.iter_mut().find(|stream| stream.place == request.place);
             stream.into_iter().for_each(|stream| stream.ask(from, &request, (self.incarnation, self.part_bytes)));
         }
@@ -121,7 +122,7 @@ impl ReplicaSender {
             let ready = outbound.ready_peers();
             let chosen = self.by_level.choose(now_ns, ready);
             let level = chosen.map(|(at, _)| self.by_level.streams[at].settings.level);
-            match self.own_requests.next(now_ns, level, outbound, datagram) {
+            match self.requests.next(now_ns, level, outbound, datagram) {
                 Some(Ok((to, bytes))) => return ReplicaStep::Send { to, bytes },
                 Some(Err(until_ns)) => return ReplicaStep::Wait { until_ns },
                 None => {}

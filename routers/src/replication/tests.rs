@@ -7,8 +7,10 @@ mod hops;
 mod hostile;
 mod joining;
 mod lossy;
+mod older;
 mod requests;
 mod sealed;
+mod slow;
 
 use super::{Describe, ReceivedReplica, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
@@ -92,7 +94,7 @@ struct Router {
 impl Router {
     fn new(ground: &Ground, settings: &Settings, replicas: &[ReplicaSettings]) -> Self {
         let stats = Stats::new(settings, START);
-        let sender = ReplicaSender::new(settings, replicas);
+        let mut sender = ReplicaSender::new(settings, replicas);
         let receiver = ReplicaReceiver::new(settings, replicas, ground.join(), Arc::new(FirstByte));
         let receiver = receiver.asking_by(sender.requests());
         let outbound = Outbound::new(settings, stats.clone());

@@ -229,6 +229,7 @@ impl PeerSessions {
     /// # Panics
     /// If it was used before.
     pub(super) fn use_up(&self, port: Port, peer: NodeIndex, sequence: u64) {
+        // ORDERING: Relaxed; nothing is handed over by it. All threads see its values in one order.
         let next = self.peer(peer).sealed[port as usize].fetch_max(sequence + 1, Ordering::Relaxed);
         assert!(sequence >= next, "sequence {sequence} is sealed a second time");
     }

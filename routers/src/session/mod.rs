@@ -24,6 +24,7 @@ mod estimate;
 pub mod frame;
 mod ledger;
 mod outgoing;
+mod parts;
 pub mod server;
 mod splitter;
 mod table;
@@ -33,10 +34,7 @@ pub use estimate::{Bounded, ServerClockEstimate};
 pub use outgoing::BATCH_BYTES;
 pub use table::{Conflict, ENTRIES_MAX, RoutingTable};
 
-use crate::frame::{FrameKind, NodeIndex};
-use crate::replication::{LINE_PART_ROOM, LineReplicas};
-use frame::SessionFrameKind;
-use outgoing::Outgoing;
+use crate::replication::LineReplicas;
 use rohrpost_mailbox::{Head, Kind, Name, Options, Type};
 
 /// A client by its place at the server; free again when its connection has been closed.
@@ -70,17 +68,6 @@ pub trait ReplicaEnd {
     fn replicas(&mut self) -> Option<&mut LineReplicas> {
         None
     }
-}
-
-/// Makes the next part for a node ready, if the line has room and there is one. Whether more wait.
-fn add_part(outgoing: &mut Outgoing, now_ns: u64, node: NodeIndex, end: &mut impl ReplicaEnd) -> bool {
-    let Some(replicas) = end.replicas() else { return false };
-    outgoing.add_part(LINE_PART_ROOM, |content| {
-        let (kind, length) = replicas.next(now_ns, node, content)?;
-        let is_record = kind == FrameKind::RecordPart;
-        Some((if is_record { SessionFrameKind::RecordPart } else { SessionFrameKind::Description }, length))
-    });
-    replicas.waits_for(now_ns, node)
 }
 
 /// Writes the error replies to commands that go no further. The routers do not know how an error is encoded.

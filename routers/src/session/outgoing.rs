@@ -192,13 +192,9 @@ impl Outgoing {
         self.queue = Some(queue);
     }
 
-    /// Makes a part of a replica ready, if nothing else is and nothing waits. `write` puts what follows the frame's head
-    /// into the room that it gets, and says how long it is; none: there is none.
-    pub(super) fn add_part(
-        &mut self,
-        room: usize,
-        write: impl FnOnce(&mut [u8]) -> Option<(SessionFrameKind, usize)>,
-    ) {
+    /// Makes a part of a replica ready, if nothing else is and nothing waits. `write` puts what follows the head of the
+    /// frame into the room that it gets, and says how long it is; none: there is none.
+    pub(super) fn add_part(&mut self, room: usize, write: impl FnOnce(&mut [u8]) -> Option<(SessionFrameKind, usize)>) {
         if !self.ready().is_empty() || self.has_waiting() {
             return;
         }

@@ -123,9 +123,8 @@ impl ReplicaTx {
 
     /// Sleeps until there is a record or a request; for how long it slept.
     fn wait(&mut self, time: Duration) -> Duration {
-        let (requests, shared) = (self.sender.requests().clone(), &self.shared);
-        let has_more = || shared.ends() || !requests.is_empty();
-        let mut readers = self.sender.readers();
+        let (mut readers, has_requests) = self.sender.waits_on();
+        let has_more = || self.shared.ends() || has_requests();
         if readers.is_empty() {
             return self.participant.wait(time, has_more);
         }
@@ -167,7 +166,7 @@ impl Shell {
     pub fn replicate(&mut self, node: &Arc<Node>, parts: ReplicaParts<'_>) -> Result<(), ShellError> {
         let (settings, shared) = (self.settings.clone(), self.shared.clone());
         let [sending, receiving] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
-        let sender = ReplicaSender::new(&settings, parts.replicas);
+        let mut sender = ReplicaSender::new(&settings, parts.replicas);
         let receiver = ReplicaReceiver::new(&settings, parts.replicas, receiving, parts.describe.clone());
         let receiver = receiver.asking_by(sender.requests());
         self.replicas = ReplicaCounts { sent: sender.counts(), received: receiver.counts() };

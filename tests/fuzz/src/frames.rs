@@ -44,6 +44,7 @@ fn validate(datagram: &[u8]) {
         Frame::Alive(alive) => assert_eq!(alive.to_bytes(), rest),
         Frame::Refusal(refusal) => assert_eq!(refusal.to_bytes(), rest),
         Frame::Replica(ReplicaFrame::Request(request)) => {
+            let request = request.read();
             let mut bytes = [0; PART_REQUEST_BYTES_MAX];
             let len = request.write(&mut bytes);
             assert_eq!(bytes[..len], *rest);

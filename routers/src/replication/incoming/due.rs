@@ -9,12 +9,10 @@ impl IncomingReplica {
     pub(in crate::replication) fn poll(&mut self, now: Now<'_>) -> bool {
         let deadline_ns = self.settings.deadline_ns;
         if self.open[OLDER].is_open() {
-            let holds_up = self.open[NEWER].is_whole() && now.ns.saturating_sub(self.whole_ns) >= self.patience.ns();
+            let holds_up = self.open[NEWER].is_whole() && now.ns.saturating_sub(self.whole_ns) >= self.answer_time.ns();
             if holds_up || self.open[OLDER].is_given_up(now.ns, deadline_ns) {
                 self.give_up(OLDER);
-                if self.open[NEWER].is_whole() {
-                    self.publish(now, NEWER);
-                }
+                self.publish_if_whole(now);
             }
         }
         [OLDER, NEWER].into_iter().for_each(|at| self.ask_if_due(now.ns, at));
@@ -30,8 +28,8 @@ impl IncomingReplica {
 
     /// Asks for what is missing of an open record, if it is time.
     pub(super) fn ask_if_due(&mut self, now_ns: u64, at: usize) {
-        let (Some(requests), open) = (&self.requests, &mut self.open[at]) else { return };
-        if !open.is_due(now_ns, (self.settings.deadline_ns, self.patience.ns())) {
+        let (Some(requests), open) = (&mut self.requests, &mut self.open[at]) else { return };
+        if !open.is_due(now_ns, (self.settings.deadline_ns, self.answer_time.ns())) {
             return;
         }
         let mut last = None;
@@ -44,8 +42,9 @@ impl IncomingReplica {
                 sequence: open.sequence,
                 parts,
             };
-            let to = OutgoingRequest { to: self.settings.node, level: self.settings.level, request };
-            if !self.patience.may_ask(now_ns) || !requests.ask(to) {
+            let to = OutgoingRequest { to: self.settings.node, request };
+            // What leaves is counted, and this thread alone fills the ring.
+            if requests.is_full() || !self.answer_time.may_ask(now_ns) || requests.push(to).is_err() {
                 break;
             }
             self.counts.asked.add(parts.iter().map(|word| u64::from(word.count_ones())).sum());

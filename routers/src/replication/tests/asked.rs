@@ -24,6 +24,7 @@ fn body(sequence: u64, most: usize) -> Vec<u8> {
 
 /// A wire one way: datagrams by the time of their arrival.
 struct Wire {
+    delay_ns: u64,
     loss: f64,
     rng: ChaCha8Rng,
     datagrams: BTreeMap<(u64, u64), Vec<u8>>,
@@ -32,7 +33,7 @@ struct Wire {
 
 impl Wire {
     fn new(seed: u64, loss: f64) -> Self {
-        Self { loss, rng: ChaCha8Rng::seed_from_u64(seed), datagrams: BTreeMap::new(), count: 0 }
+        Self { delay_ns: 300 * US, loss, rng: ChaCha8Rng::seed_from_u64(seed), datagrams: BTreeMap::new(), count: 0 }
     }
 
     /// Delays, and with that reorders, some; doubles and damages a few, and moves parts of records, as a sender with a
@@ -56,7 +57,7 @@ impl Wire {
             }
             let late_ns =
                 if self.loss > 0.0 && self.rng.random_bool(0.05) { self.rng.random_range(0..800 * US) } else { 0 };
-            self.datagrams.insert((now_ns + 300 * US + late_ns, self.count), datagram.clone());
+            self.datagrams.insert((now_ns + self.delay_ns + late_ns, self.count), datagram.clone());
         }
     }
 
@@ -67,11 +68,11 @@ impl Wire {
 }
 
 /// Two nodes with a bad wire between them.
-struct Pair {
+pub(super) struct Pair {
     now_ns: u64,
     origin: Origin,
-    holder: Holder,
-    writer: StreamWriter,
+    pub(super) holder: Holder,
+    pub(super) writer: StreamWriter,
     reader: StreamReader,
     there: Wire,
     back: Wire,
@@ -85,11 +86,11 @@ struct Pair {
     told: u64,
     /// Sequences that were asked for, one for each request.
     asked: Vec<u64>,
-    again: u64,
+    pub(super) again: u64,
 }
 
 impl Pair {
-    fn new(replica: ReplicaSettings, seed: u64, [there, back]: [f64; 2]) -> Self {
+    pub(super) fn new(replica: ReplicaSettings, seed: u64, [there, back]: [f64; 2]) -> Self {
         let (shape, replicas) = (replica.shape, [replica]);
         let (origin, holder) = (Origin::new(&replicas), Holder::new(&replicas));
         let (writer, reader) = (origin.writer(ID, shape), holder.reader());
@@ -116,13 +117,18 @@ impl Pair {
         pair
     }
 
-    fn write(&mut self) {
+    /// From now on either way takes so long.
+    pub(super) fn slow_down(&mut self, delay_ns: u64) {
+        (self.there.delay_ns, self.back.delay_ns) = (delay_ns, delay_ns);
+    }
+
+    pub(super) fn write(&mut self) {
         let sequence = self.writer.written();
         self.writer.write(at(self.now_ns), &body(sequence, self.most)).unwrap();
         self.written_ns.push(self.now_ns);
     }
 
-    fn run(&mut self, time_ns: u64) {
+    pub(super) fn run(&mut self, time_ns: u64) {
         let end_ns = self.now_ns + time_ns;
         while self.now_ns < end_ns {
             self.now_ns += STEP_NS;
@@ -146,7 +152,7 @@ impl Pair {
                 panic!("it only asks");
             };
             assert_eq!(head.kind, FrameKind::PartRequest);
-            self.asked.push(request.sequence);
+            self.asked.push(request.read().sequence);
             self.back.put(now_ns, datagram);
         }
         while let Some(datagram) = self.back.take(now_ns) {
@@ -176,7 +182,7 @@ impl Pair {
     }
 
     /// What was written is read or told as lost, and counted on both ends.
-    fn settle(&mut self) {
+    pub(super) fn settle(&mut self) {
         self.there.loss = 0.0;
         self.run(1500 * MS);
         // Of three in a row one is sent at the least.
@@ -205,11 +211,11 @@ impl Pair {
 }
 
 /// Records of 60 kB: 44 parts.
-fn pictures() -> ReplicaSettings {
+pub(super) fn pictures() -> ReplicaSettings {
     ReplicaSettings { shape: StreamShape { record_bytes: 60_000, ..SHAPE }, ..image() }
 }
 
-fn poses() -> ReplicaSettings {
+pub(super) fn poses() -> ReplicaSettings {
     ReplicaSettings { shape: StreamShape { record_bytes: 64, keep: 64, ..SHAPE }, ..image() }
 }
 

@@ -9,7 +9,7 @@ fn head(from: NodeIndex) -> FrameHead {
     FrameHead { kind: FrameKind::RecordPart, system: 1, from, to: HOLDER, digest: 7, incarnation: 100, sequence: 0 }
 }
 
-fn part(bytes: &[u8]) -> RecordPart<'_> {
+pub(super) fn part(bytes: &[u8]) -> RecordPart<'_> {
     RecordPart {
         place: 0,
         generation: 0,
@@ -32,8 +32,14 @@ fn take(holder: &mut Holder, from: NodeIndex, part: RecordPart<'_>) -> bool {
     holder.router.receiver.take(START, || time(START), &head(from), &ReplicaFrame::Record(part))
 }
 
+/// Of this incarnation of the origin's router.
+pub(super) fn take_of(holder: &mut Holder, now_ns: u64, incarnation: u64, part: RecordPart<'_>) -> bool {
+    let head = FrameHead { incarnation, ..head(ORIGIN) };
+    holder.router.receiver.take(now_ns, || time(now_ns), &head, &ReplicaFrame::Record(part))
+}
+
 /// A replica's node that knows the description.
-fn described() -> Holder {
+pub(super) fn described() -> Holder {
     described_by(image())
 }
 

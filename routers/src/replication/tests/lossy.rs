@@ -190,7 +190,8 @@ fn what_is_read_is_whole_and_sequences_do_not_go_back() {
         world.check();
         let newest = (world.life, world.writer.as_ref().unwrap().written() - 1);
         assert_eq!(world.holder.lost(ReplicaLoss::Unwritable), 0, "seed {seed}");
-        assert_eq!(world.last, Some(newest), "seed {seed}: the newest did not arrive");
+        let lost = ReplicaLoss::ALL.map(|cause| (cause, world.holder.lost(cause), world.origin.lost(cause)));
+        assert_eq!(world.last, Some(newest), "seed {seed}: the newest did not arrive; {lost:?}, now {}", world.now_ns);
         read += world.read;
         whole = whole.max(world.holder.records());
         completed += world.holder.counts().completed.get();

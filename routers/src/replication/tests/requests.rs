@@ -1,7 +1,8 @@
 //! Requests that nobody should send: refused and counted, and what is right is still answered.
 
+use super::super::requests::OutgoingRequest;
 use super::*;
-use crate::frame::{FrameKind, PartRequest};
+use crate::frame::{FrameKind, PART_REQUEST_BYTES_MAX, PartRequest, PartRequestBytes};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -12,10 +13,13 @@ fn request(sequence: u64, indices: &[usize]) -> PartRequest {
     PartRequest { place: 0, generation: 0, first: 0, router: 100, sequence, parts }
 }
 
-/// Hands a request over; whether there was room for it.
+/// Hands a request over; whether it was not refused.
 fn ask(origin: &mut Origin, from: NodeIndex, request: PartRequest) -> bool {
     let kind = FrameKind::PartRequest;
     let head = FrameHead { kind, system: 1, from, to: ORIGIN, digest: 7, incarnation: 101, sequence: 0 };
+    let mut bytes = [0; PART_REQUEST_BYTES_MAX];
+    let len = request.write(&mut bytes);
+    let request = PartRequestBytes::parse(&bytes[..len]).unwrap();
     origin.router.receiver.take(START, || time(START), &head, &ReplicaFrame::Request(request))
 }
 
@@ -88,10 +92,44 @@ fn a_record_leaves_twice_and_some_parts_at_most_however_often_it_is_asked_for() 
     assert!((2 * (5 + 8)..=3 * (5 + 8)).contains(&again(&origin)), "{}", again(&origin));
     assert!(origin.lost(ReplicaLoss::Exhausted) > 500, "{}", origin.lost(ReplicaLoss::Exhausted));
     // A flood of requests finds its queue full, and delays nothing.
-    let taken = (0..1000).filter(|_| ask(&mut origin, HOLDER, request(2, &[0]))).count();
-    assert_eq!(taken, 32);
+    assert!((0..1000).all(|_| ask(&mut origin, HOLDER, request(2, &[0]))), "none is refused");
+    assert_eq!(origin.lost(ReplicaLoss::Crowded), 1000 - 32);
     writer.write(at(200), &[9; 6000]).unwrap();
     assert_eq!(origin.leave(&mut now_ns).len(), 5);
+}
+
+/// What this node asks for of a less important stream waits for its own records; what it asks for of a more important
+/// one does not wait behind that.
+#[test]
+fn a_request_that_waits_holds_up_no_other() {
+    const POSE: Name = Name::new(1, 240, 0, 0);
+    const OWN: Name = Name::new(1, 241, 0, 0);
+    let of = |from, level, node, to| ReplicaSettings { from, level, node, to: 1_u64 << to, ..image() };
+    // Two come from another node, and one goes there.
+    let replicas = [of(CAMERA, 20, HOLDER, ORIGIN), of(POSE, 1, HOLDER, ORIGIN), of(OWN, 10, ORIGIN, HOLDER)];
+    let mut origin = Origin::new(&replicas);
+    origin.ground.join().describe_replicas(OWN, &words(3)).unwrap();
+    origin.look();
+    let own = StreamId { name: OWN, number: NUMBER };
+    let (mut writer, mut now_ns) = (origin.writer(own, SHAPE), START);
+    origin.leave(&mut now_ns);
+    let mut rings = origin.router.sender.requests();
+    let mut ask = |place: u16| {
+        let asked = OutgoingRequest { to: HOLDER, request: PartRequest { place, ..request(0, &[0]) } };
+        rings.outgoing[usize::from(place)].as_mut().unwrap().push(asked).is_ok()
+    };
+    // More than its ring has room for.
+    assert!((0..100).filter(|_| ask(0)).count() < 100);
+    assert!(ask(1), "there is room for those of another stream");
+    for sequence in 0..20 {
+        writer.write(at(100 + sequence), &[7; 6000]).unwrap();
+    }
+    let left: Vec<_> = origin.leave(&mut now_ns).iter().map(|datagram| (datagram[3], datagram[36])).collect();
+    let [part, request] = [FrameKind::RecordPart, FrameKind::PartRequest].map(|kind| kind as u8);
+    assert_eq!(left[0], (request, 1), "the most important of all");
+    let last_part = left.iter().rposition(|sent| *sent == (part, 2)).unwrap();
+    let first_bulk = left.iter().position(|sent| *sent == (request, 0)).unwrap();
+    assert!(last_part < first_bulk, "{left:?}");
 }
 
 #[test]

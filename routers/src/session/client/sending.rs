@@ -4,11 +4,12 @@ use super::{Client, ClientHost, ClientPackage, ClientState, Registration};
 use crate::admission::capped;
 use crate::queue::QueueShare;
 use crate::report::NotDelivered;
+use crate::session::WAIT_MAX_NS;
 use crate::session::counts::Cause;
 use crate::session::frame::{Carried, Ranges, SessionMessage};
 use crate::session::ledger::Ledger;
 use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
-use crate::session::{WAIT_MAX_NS, add_part};
+use crate::session::parts::add_part;
 use rohrpost_mailbox::{Name, Priority};
 
 impl Client {

@@ -3,11 +3,14 @@
 mod hostile;
 mod turns;
 
-use super::plan::Plan;
-use super::world::rings::{PICTURE, POSE};
+use super::ground::{Ground, Notes};
+use super::plan::{Plan, client_settings, ranges, server_settings};
+use super::world::rings::{PICTURE, POSE, Rings, SERVER};
 use super::world::{MS, S, World};
 use super::{WELL_NS, seeds};
 use crate::replication::{LINE_PART_BYTES, LINE_PART_ROOM};
+use crate::session::ClientIndex;
+use crate::session::server::ServerStep;
 use std::collections::BTreeMap;
 
 /// What both kernels hold of a line there.
@@ -92,6 +95,30 @@ fn a_package_waits_for_one_part_at_most_and_what_the_kernel_has() {
         let (alone_ns, beside_ns) = (last(false), last(true));
         assert!(beside_ns <= alone_ns + waits_ns, "seed {seed}: {beside_ns} ns, without replicas {alone_ns} ns");
     }
+}
+
+/// Else the line would be measured while nothing is to be sent, and be taken for slow.
+#[test]
+fn behind_the_last_part_nothing_waits() {
+    let clients = [0, 1].map(|client| (client_settings(client, 100 + client as u64), ranges(client)));
+    let said = Notes { rings: Some(Rings::new(SERVER, 2)), ..Notes::default() };
+    let mut ground = Ground::with_said(server_settings(5), clients, said);
+    let mut waited: BTreeMap<ClientIndex, Vec<bool>> = BTreeMap::new();
+    for ms in [100, 200, 300] {
+        assert!(ground.said.rings.as_mut().unwrap().write(ms));
+        loop {
+            let index = match ground.server.poll(ground.now_ns, &mut ground.said) {
+                ServerStep::Write(index) => index,
+                ServerStep::Look => continue,
+                ServerStep::Close(_) | ServerStep::Wait { .. } => break,
+            };
+            waited.entry(index).or_default().push(ground.server.has_waiting(index));
+            let bytes = ground.server.ready(index).len();
+            ground.server.took(ground.now_ns, index, bytes);
+        }
+        assert!(waited.len() == 2 && waited.values().all(|waited| waited.last() == Some(&false)), "{waited:?}");
+    }
+    assert!(waited.values().all(|waited| waited.contains(&true)), "{waited:?}");
 }
 
 const _: () = assert!(LINE_PART_BYTES <= HELD_BYTES as usize);

@@ -8,7 +8,7 @@ use crate::session::tests::plan::{client_settings, ranges, server_settings};
 use crate::session::tests::world::rings::{BACK, PICTURE, Rings, SERVER};
 
 const WORDS: [u8; 100] = [3; 100];
-/// The client on whose node the stream is written.
+/// The client of the node on which the stream is written.
 const WRITER: usize = 0;
 /// One that has no say in it.
 const OTHER: usize = 1;

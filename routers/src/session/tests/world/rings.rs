@@ -15,7 +15,7 @@ use std::time::Duration;
 
 /// The server's node; those of clients have their indices.
 pub(in crate::session::tests) const SERVER: NodeIndex = 63;
-/// The client on whose node the last stream is written.
+/// The client of the node on which the last stream is written.
 const WRITER: NodeIndex = 0;
 const NUMBER: u16 = 7;
 /// By place: the module, bytes of a record, records that are kept, the level, and how often one is written, ms.
@@ -149,6 +149,7 @@ impl Rings {
         self.writers.iter().find(|(of, ..)| *of == place).map_or(0, |(.., written)| *written)
     }
 
+    /// Writes what is due at this moment; whether something was.
     pub(in crate::session::tests) fn write(&mut self, now_ms: u64) -> bool {
         let mut has_written = false;
         for (place, writer, written) in &mut self.writers {
