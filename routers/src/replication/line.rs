@@ -20,6 +20,7 @@ use super::{Describe, LINE_PART_BYTES, LINE_PART_ROOM, ReplicaSettings};
 use crate::counts::Count;
 use crate::frame::{FrameKind, NodeIndex, ReplicaFrame};
 use rohrpost_mailbox::{Name, Participant, StreamReader, SystemTime};
+use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 /// Modules that have begun are looked for this often, ns.
@@ -174,10 +175,23 @@ impl LineReplicas {
     /// # Panics
     /// When `content` has less than [`LINE_PART_ROOM`] bytes.
     pub fn next(&mut self, now_ns: u64, node: NodeIndex, content: &mut [u8]) -> Option<(FrameKind, usize)> {
+        self.next_before(now_ns, (node, LEVELS as u8), content)
+    }
+
+    /// The same of streams that are more important than this level.
+    ///
+    /// # Panics
+    /// When `content` has less than [`LINE_PART_ROOM`] bytes.
+    pub fn next_before(
+        &mut self,
+        now_ns: u64,
+        (node, level): (NodeIndex, u8),
+        content: &mut [u8],
+    ) -> Option<(FrameKind, usize)> {
         let content = &mut content[..LINE_PART_ROOM];
         let destination = self.destinations.iter_mut().find(|destination| destination.node == node)?;
         loop {
-            let (at, to) = destination.streams.choose(now_ns, 1 << node)?;
+            let (at, to) = destination.streams.choose_before(now_ns, 1 << node, level)?;
             // What is held is there; but a stream that was made anew takes it along, and another one is chosen.
             let stream = &mut destination.streams.streams[at];
             if let Some(filled) = stream.fill(now_ns, &self.time, (to, LINE_PART_BYTES), content) {

@@ -11,6 +11,7 @@ mod older;
 mod requests;
 mod sealed;
 mod slow;
+mod two_hops;
 
 use super::{Describe, ReceivedReplica, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};

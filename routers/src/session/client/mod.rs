@@ -346,6 +346,7 @@ impl Client {
         if self.is_blocked {
             return ClientStep::Wait { until_ns: self.look_ns };
         }
+        self.add_part(now_ns, host);
         self.refill(now_ns, host);
         self.add_part(now_ns, host);
         match self.outgoing.ready() {

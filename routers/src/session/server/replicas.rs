@@ -21,19 +21,22 @@ impl Server {
         }
     }
 
-    /// Makes the next part for a client ready, if nothing else is, and it got none in this turn.
-    pub(super) fn add_part(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) {
-        let turn = self.turn;
-        let Some(member) = self.member_mut(client).filter(|member| member.is_member()) else { return };
-        let Some(node) = member.node.filter(|_| member.outgoing.ready().is_empty()) else { return };
+    /// Makes the next part for a client ready, if nothing else is, no packages go first, and it got none in this turn.
+    /// Whether one was made.
+    pub(super) fn add_part(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) -> bool {
+        let (turn, party) = (self.turn, self.settings.system.map_or(0, |(system, _)| system.into()));
+        let Some(member) = self.member_mut(client).filter(|member| member.is_member()) else { return false };
+        let Some(node) = member.node.filter(|_| member.outgoing.ready().is_empty()) else { return false };
         if member.part_turn == turn {
             self.has_put_off |= member.has_parts;
-            return;
+            return false;
         }
-        member.has_parts = add_part(&mut member.outgoing, now_ns, node, host);
-        if !member.outgoing.ready().is_empty() {
+        let (is_made, has_parts) = add_part(&mut member.outgoing, now_ns, (node, party), host);
+        member.has_parts = has_parts;
+        if is_made {
             member.part_turn = turn;
         }
+        is_made
     }
 
     /// A client may host other names now: it may be a node by now, or may have been one.

@@ -2,7 +2,7 @@
 
 use crate::harness::MS;
 use crate::session::ClientIndex;
-use crate::session::frame::{Carried, SessionMessage};
+use crate::session::frame::{Carried, LENGTH_MAX, SessionFrameHead, SessionFrameKind, SessionMessage};
 use crate::session::server::ServerStep;
 use crate::session::tests::ground::{Ground, Notes};
 use crate::session::tests::plan::{client_settings, module, ranges, server_settings};
@@ -90,4 +90,41 @@ fn poses_alone_are_no_more_than_they_are() {
         assert_eq!((step == ServerStep::Look, written.len()), (false, 3), "one to each client");
         assert!(written.iter().all(|(_, more)| !more), "{written:?}");
     }
+}
+
+impl Ground {
+    /// Whether what leaves next to a client is a part; then its stream is full for a moment.
+    fn sends_part(&mut self, client: usize) -> bool {
+        let place = self.ends[client].1.unwrap();
+        loop {
+            let ServerStep::Write(index) = self.server.poll(self.now_ns, &mut self.said) else { continue };
+            let ready = self.server.ready(index);
+            let (first, bytes) = (ready.first_chunk().copied(), ready.len());
+            let Some(first) = first.filter(|_| index == place) else {
+                self.server.took(self.now_ns, index, bytes);
+                continue;
+            };
+            self.server.took(self.now_ns, index, bytes - 1);
+            self.writes();
+            self.server.took(self.now_ns, place, 1);
+            let head = SessionFrameHead::parse(&first, LENGTH_MAX).unwrap();
+            return head.kind == SessionFrameKind::RecordPart;
+        }
+    }
+}
+
+/// Poses are more important than these.
+#[test]
+fn while_less_important_packages_wait_parts_and_batches_of_them_have_turns() {
+    let mut ground = ground();
+    ground.rings().write(POSES_MS);
+    while ground.writes().0 == ServerStep::Look {}
+    ground.reads_piece((0, 1));
+    ground.now_ns += MS;
+    let mut kinds = Vec::new();
+    for _ in 0..4 {
+        ground.rings().write(POSES_MS);
+        kinds.push(ground.sends_part(1));
+    }
+    assert_eq!(kinds.iter().filter(|is_part| **is_part).count(), 2, "in turn: {kinds:?}");
 }
