@@ -196,9 +196,9 @@ impl Outgoing {
     }
 
     /// Makes a part of a replica ready, if nothing else is. While packages wait, a batch of them and a part have turns:
-    /// a part of what is more important than they are, or any beside those of another `party` than its own. `write` puts
-    /// what follows the head of the frame into the room that it gets, of a level before the one that it gets, and says
-    /// how long it is; none: there is none. Whether one was made.
+    /// a part of what is more important than they are, or any beside those of another `party` than its own. `write`
+    /// puts what follows the head of the frame into the room that it gets, of a level before the one that it gets, and
+    /// says how long it is; none: there is none. Whether one was made.
     pub(super) fn add_part(
         &mut self,
         (room, party): (usize, u32),

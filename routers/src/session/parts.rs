@@ -7,8 +7,8 @@ use crate::frame::{FrameKind, NodeIndex};
 use crate::replication::LINE_PART_ROOM;
 
 /// Makes the next part for a node ready, if the line has room and there is one, and no packages go first: those of its
-/// own party that are as important, and a batch of any after each part. Whether one was made, and whether more wait behind
-/// it: what measures how fast the line is must know.
+/// own party that are as important, and a batch of any after each part. Whether one was made, and whether more wait
+/// behind it: what measures how fast the line is must know.
 pub(super) fn add_part(
     outgoing: &mut Outgoing,
     now_ns: u64,
