@@ -1,10 +1,13 @@
 //! Parts of replicas, as an end of a session sends them.
 
 use super::ReplicaEnd;
-use super::frame::SessionFrameKind;
+use super::frame::{HEAD_BYTES, SessionFrameKind};
 use super::outgoing::Outgoing;
-use crate::frame::{FrameKind, NodeIndex};
+use crate::frame::{FrameKind, NodeIndex, RECORD_PART_HEAD_BYTES};
 use crate::replication::LINE_PART_ROOM;
+use rohrpost_network::LINE_PART_HEADS_BYTES;
+
+const _: () = assert!(LINE_PART_HEADS_BYTES == HEAD_BYTES + RECORD_PART_HEAD_BYTES, "what `check` reckons with");
 
 /// Makes the next part for a node ready, if the line has room and there is one, and no packages go first: those of its
 /// own party that are as important, and a batch of any after each part. Whether one was made, and whether more wait
