@@ -58,8 +58,8 @@ impl StreamReader {
         }
     }
 
-    /// What the ring has left out before this record since it began, lost or sampled out; none when it is there no more,
-    /// or not yet. Only rings of replicas leave out some.
+    /// What the ring has left out before this record since it began, lost or sampled out; none when it is there no
+    /// more, or not yet. Only rings of replicas leave out some.
     pub fn left_out_before(&self, sequence: u64) -> Option<Missed> {
         let LeftOut { lost, sampled } = self.place.as_ref()?.ring().left_out_before(sequence)?;
         Some(Missed { lost, sampled, passed_over: 0 })

@@ -1,4 +1,4 @@
-//! From the node that writes a stream to one that has it by another: each record that is missing has its cause at the end.
+//! From the node that writes a stream to one that has it by another: what is missing there has its cause.
 
 use super::{CAMERA, FirstByte, Ground, ID, SHAPE, at, image, time, words};
 use crate::frame::{DescriptionPart, FrameKind, NodeIndex, RecordPart, ReplicaFrame};
