@@ -77,6 +77,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let keys = network.and_then(|network| network::keys_folder(&file, network.security, &folder));
     let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
     let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
+    network::validate_count(&file, &nodes);
     network::validate(&file, on_lan, &classes);
     let tcp = file.section("tcp", "[tcp]").map(|section| Tcp::read(section, &nodes, tdma.as_ref()));
     if tcp.is_some() {

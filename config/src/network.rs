@@ -99,14 +99,18 @@ pub(crate) fn keys_folder(file: &Section<'_>, security: Security, folder: &Path)
     named.map(|path| folder.join(path))
 }
 
+/// Validates that there are no more nodes than have a number, those beyond the LAN included.
+pub(crate) fn validate_count(file: &Section<'_>, nodes: &[Node]) {
+    if let Some(node) = nodes.get(NODES_MAX) {
+        file.reader.report(node.line, format!("[nodes]: there are {}; a system has at most {NODES_MAX}", nodes.len()));
+    }
+}
+
 /// Validates what several nodes of a LAN need beside `[network]`: addresses that can reach each other, and the class of
 /// routers.
 pub(crate) fn validate(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
     if nodes.len() < 2 {
         return;
-    }
-    if let Some(node) = nodes.get(NODES_MAX) {
-        file.reader.report(node.line, format!("[nodes]: there are {}; a system has at most {NODES_MAX}", nodes.len()));
     }
     if file.get("network").is_none() {
         file.report(format!("section `[network]` is missing; with several nodes add it, and {CHOICES}"));

@@ -173,3 +173,21 @@ fn replicas_are_carried_sealed_or_not() {
         assert_eq!(replicas.iter().map(|replica| replica.changed).collect::<Vec<_>>(), [false, true], "{security}");
     }
 }
+
+#[test]
+fn nodes_beyond_the_lan_count_as_well() {
+    let text = |laptops: usize| {
+        let laptops: String = (0..laptops).map(|at| format!("[nodes.laptop-{at}]\nnetwork = \"tcp\"\n")).collect();
+        let text = format!(
+            "installation = \"many\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nrouter = {{ id = 250 }}\ntcp = \
+             {{ id = 64 }}\nlaser = {{ id = 150 }}\n[nodes.base]\naddress = \"10.0.0.1\"\n{laptops}[tcp]\naddress = \
+             \"10.0.0.1\"\nserver = \"base\"\nsecurity = \"none\"\n[[module]]\nname = \"laser.0\"\nnode = \
+             \"base\"\nbuiltin = \"sim\"\n"
+        );
+        Installation::parse(&text, Path::new("many.toml")).map_err(|errors| errors.to_string())
+    };
+    let said = |laptops| text(laptops).err().unwrap_or_default();
+    let many = "there are 65; a system has at most 64";
+    assert!(said(64).contains(many), "{}", said(64));
+    assert!(!said(63).contains("a system has at most"), "{}", said(63));
+}

@@ -10,6 +10,11 @@ pub const FRAME_HEAD_BYTES: usize = 36;
 pub const FRAGMENT_HEAD_BYTES: usize = 32;
 /// Head of a part of a record, behind that of its datagram.
 pub const RECORD_PART_HEAD_BYTES: usize = 64;
+/// Bytes of a record in each part by the TCP router but the last. An important package waits for no more than one part
+/// that is ready.
+pub const LINE_PART_BYTES: usize = 4096;
+/// What stands before them: the head of a session's frame, and that of the part.
+pub const LINE_PART_HEADS_BYTES: usize = 8 + RECORD_PART_HEAD_BYTES;
 /// Content of a datagram of time.
 pub const TIME_BYTES: usize = 72;
 /// Content of a keep-alive.

@@ -4,6 +4,7 @@ use super::Page;
 use crate::output::Level;
 use crate::record::{RecordedItems, Sampling};
 use crate::units::{duration_text, size_about, size_text};
+use rohrpost_network::{LINE_PART_BYTES, LINE_PART_HEADS_BYTES};
 use std::time::Duration;
 
 impl Page<'_> {
@@ -78,7 +79,9 @@ impl Page<'_> {
             );
             self.entry("sends", &words);
             for (node, to) in self.installation.hops_by_tcp(replica) {
-                let bytes = u64::from(replica.spec(self.installation).record_bytes);
+                let record_bytes = replica.spec(self.installation).record_bytes as usize;
+                let parts = record_bytes.div_ceil(LINE_PART_BYTES).max(1);
+                let bytes = record_bytes + parts * LINE_PART_HEADS_BYTES;
                 let load = match replica.sampling {
                     Sampling::Rate(rate_hz) => {
                         format!("; up to {} a second to each", size_about((bytes as f64 * rate_hz) as u64))

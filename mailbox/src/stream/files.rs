@@ -6,6 +6,7 @@ use crate::step::step;
 use crate::stream::segment::{StreamSegment, id_of, path_of};
 use crate::stream::shape::StreamId;
 use std::fs;
+use std::time::Duration;
 
 impl Node {
     /// All streams of the node, in order.
@@ -26,7 +27,15 @@ impl Node {
     /// # Errors
     /// When the node's directory cannot be changed.
     pub fn remove_orphan_stream(&self, id: StreamId) -> Result<bool, NodeError> {
-        let _registry = RegistryLock::take_within(self.path(), REGISTRY_PATIENCE)?;
+        self.remove_orphan_stream_within(id, REGISTRY_PATIENCE)
+    }
+
+    /// The same for a thread that others wait for: while another process has the registry, it waits for so long only.
+    ///
+    /// # Errors
+    /// When the node's directory cannot be changed.
+    pub fn remove_orphan_stream_within(&self, id: StreamId, patience: Duration) -> Result<bool, NodeError> {
+        let _registry = RegistryLock::take_within(self.path(), patience)?;
         owned::remove_orphan::<StreamSegment>(self, id, || {
             let path = path_of(self.path(), id);
             fs::remove_file(&path).map_err(|error| NodeError::Io(path, error))?;

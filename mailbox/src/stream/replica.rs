@@ -12,7 +12,7 @@
 
 use crate::about;
 use crate::name::Name;
-use crate::node::NodeError;
+use crate::node::{NodeError, REGISTRY_PATIENCE};
 use crate::participant::Participant;
 use crate::stream::error::{ReplicaError, StreamError};
 use crate::stream::record::RecordInfo;
@@ -21,6 +21,7 @@ use crate::stream::shape::{StreamId, StreamShape, StreamShapeError};
 use crate::stream::writer::StreamWriter;
 use crate::stream::writing::Frame;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Records that are begun at a time, at most.
 const BEGUN_MAX: usize = 2;
@@ -86,10 +87,24 @@ impl Participant {
         shape: StreamShape,
         first: u64,
     ) -> Result<ReplicaWriter, StreamError> {
+        self.replica_writer_within(id, shape, first, REGISTRY_PATIENCE)
+    }
+
+    /// The same for a thread that others wait for: while another process has the registry, it waits for so long only.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    pub fn replica_writer_within(
+        self: &Arc<Self>,
+        id: StreamId,
+        shape: StreamShape,
+        first: u64,
+        patience: Duration,
+    ) -> Result<ReplicaWriter, StreamError> {
         if shape.frames() > LEFT_OUT {
             return Err(StreamError::Shape(id, StreamShapeError::Keep(shape.keep)));
         }
-        let writer = self.obtain_stream(id, shape, Some(first.min(SEQUENCE_MAX)))?;
+        let writer = self.obtain_stream(id, shape, Some(first.min(SEQUENCE_MAX)), patience)?;
         let drafts = [writer.draft.clone(), writer.draft.clone()];
         Ok(ReplicaWriter { writer, begun: [None, None], drafts })
     }

@@ -4,7 +4,7 @@ use crate::clock::monotonic_ns;
 use crate::doorbell;
 use crate::lock::Held;
 use crate::name::Name;
-use crate::node::{NodeError, RegistryLock};
+use crate::node::{NodeError, REGISTRY_PATIENCE, RegistryLock};
 use crate::owned::{self, Refused};
 use crate::participant::Participant;
 use crate::step::step;
@@ -18,6 +18,7 @@ use crate::stream::writing::{Frame, Progress};
 use crate::word::Claimant;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// The one writer of a stream. Dropped, the stream stays, and with it its records: the next writer goes on.
 ///
@@ -56,7 +57,7 @@ impl Participant {
     /// # Errors
     /// See [`StreamError`].
     pub fn stream_writer(self: &Arc<Self>, id: StreamId, shape: StreamShape) -> Result<StreamWriter, StreamError> {
-        self.obtain_stream(id, shape, None)
+        self.obtain_stream(id, shape, None, REGISTRY_PATIENCE)
     }
 
     /// The same; a new one may begin with a sequence other than 0.
@@ -65,13 +66,14 @@ impl Participant {
         id: StreamId,
         shape: StreamShape,
         first: Option<u64>,
+        patience: Duration,
     ) -> Result<StreamWriter, StreamError> {
         if !id.name.is_mailbox() {
             return Err(StreamError::Reserved(id));
         }
         shape.check().map_err(|error| StreamError::Shape(id, error))?;
         let (node, shape) = (self.node(), shape.as_stored());
-        let registry = RegistryLock::take(node.path()).map_err(|error| match error {
+        let registry = RegistryLock::take_within(node.path(), patience).map_err(|error| match error {
             NodeError::Descriptors(_) => StreamError::Descriptors(id),
             error => StreamError::Node(error),
         })?;

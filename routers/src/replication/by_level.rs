@@ -28,8 +28,16 @@ impl StreamsByLevel {
     /// A stream and one of its destinations that have something for a ready peer: of the most important level, and
     /// there in turn.
     pub(super) fn choose(&mut self, now_ns: u64, ready: u64) -> Option<(usize, usize)> {
+        self.choose_before(now_ns, ready, LEVELS as u8)
+    }
+
+    /// The same of streams that are more important than this level.
+    pub(super) fn choose_before(&mut self, now_ns: u64, ready: u64, before: u8) -> Option<(usize, usize)> {
         let mut begin = 0;
         for level in self.streams.chunk_by_mut(|a, b| a.settings.level == b.settings.level) {
+            if level[0].settings.level >= before {
+                break;
+            }
             let count = level.len();
             let turn = self.turns[usize::from(level[0].settings.level)];
             let first = turn.checked_sub(begin).filter(|first| *first < count).unwrap_or(0);

@@ -5,7 +5,7 @@ use super::counts::{ReplicaLoss, SentReplica};
 use super::fingerprint::{Fingerprint, Fingerprints};
 use crate::frame::{NodeIndex, PartRequest};
 use rohrpost_config::Sampling;
-use rohrpost_mailbox::{RecordInfo, StreamReader};
+use rohrpost_mailbox::{Missed, RecordInfo, StreamReader};
 use std::sync::Arc;
 
 /// Where only changes are sent, a record like the last one goes after this time nevertheless: that one may have been
@@ -37,8 +37,10 @@ pub(super) struct Destination {
     pub(super) sent: Option<(Fingerprint, u64)>,
     /// Sequence of the record of which all parts left last.
     pub(super) before: Option<u64>,
-    /// Records that were sampled out for it, modulo 2^32.
+    /// Records that were sampled out for it, here or on the way to this node, modulo 2^32.
     pub(super) sampled: u32,
+    /// What this node's ring has left out before the record that was begun last; none: not known.
+    left_out: Option<Missed>,
     /// The records that were begun last, in any order: each sequence, and what was sampled out before it.
     begun: [Option<(u64, u32)>; ASKED_MAX],
     /// How many were.
@@ -68,6 +70,7 @@ impl Destination {
             sent: None,
             before: None,
             sampled: 0,
+            left_out: None,
             begun: [None; ASKED_MAX],
             begins: 0,
             again: std::array::from_fn(|_| Again::new(parts)),
@@ -91,7 +94,7 @@ impl Destination {
         (sampling, mut fingerprints): (Sampling, Option<&mut Fingerprints>),
     ) -> bool {
         let Some(keep) = reader.shape().map(|shape| u64::from(shape.keep)) else { return false };
-        let (lost, mut next) = (&self.counts.lost, self.next.unwrap_or(newest.sequence));
+        let (mut next, mut gone) = (self.next.unwrap_or(newest.sequence), 0);
         let behind_max = if self.by_line { 1 } else { keep / 2 };
         let waits = matches!(sampling, Sampling::Rate(_)) && now_ns < self.sample_ns && !self.has_none;
         if self.under_way.is_none() && newest.sequence.saturating_sub(next) >= behind_max && !waits {
@@ -101,11 +104,8 @@ impl Destination {
                 _ => 1,
             };
             let newest = (newest.sequence - newest.sequence % every).max(next);
-            let passed = newest.div_ceil(every) - next.div_ceil(every);
-            lost.add(ReplicaLoss::Passed, passed);
-            let sampled = newest - next - passed;
-            lost.add(ReplicaLoss::Sampled, sampled);
-            self.sampled = self.sampled.wrapping_add(sampled as u32);
+            gone = newest.div_ceil(every) - next.div_ceil(every);
+            self.sample_out(newest - next - gone);
             next = newest;
         }
         while self.under_way.is_none() && next <= newest.sequence {
@@ -118,13 +118,13 @@ impl Destination {
                 Sampling::Rate(_) => now_ns >= self.sample_ns,
             };
             if !is_chosen {
-                lost.add(ReplicaLoss::Sampled, 1);
-                self.sampled = self.sampled.wrapping_add(1);
+                self.sample_out(1);
                 continue;
             }
             let is_there = !self.by_line || reader.keep(sequence).is_some();
+            let left_out = reader.left_out_before(sequence);
             let Some(record) = reader.record(sequence).filter(|_| is_there) else {
-                lost.add(ReplicaLoss::Passed, 1);
+                gone += 1;
                 continue;
             };
             if let Some(fingerprints) = &mut fingerprints {
@@ -133,21 +133,39 @@ impl Destination {
                     sent == fingerprint && now_ns.saturating_sub(at_ns) < UNCHANGED_EVERY_NS
                 };
                 if !self.has_none && self.sent.is_some_and(is_sent) {
-                    lost.add(ReplicaLoss::Sampled, 1);
-                    self.sampled = self.sampled.wrapping_add(1);
+                    self.sample_out(1);
                     continue;
                 }
                 self.sent = Some((fingerprint, now_ns));
             }
             (self.under_way, self.has_none) = (Some((record.info(), 0)), false);
+            self.pass(std::mem::take(&mut gone), left_out);
             self.begun[self.begins % ASKED_MAX] = Some((sequence, self.sampled));
             self.begins = self.begins.wrapping_add(1);
             if let Sampling::Rate(rate_hz) = sampling {
                 self.sample_ns = now_ns.saturating_add((1e9 / rate_hz) as u64);
             }
         }
+        self.counts.lost.add(ReplicaLoss::Passed, gone);
         self.next = Some(next);
         self.under_way.is_some()
+    }
+
+    /// So many records are left out by the sampling here.
+    fn sample_out(&mut self, records: u64) {
+        self.counts.lost.add(ReplicaLoss::Sampled, records);
+        self.sampled = self.sampled.wrapping_add(records as u32);
+    }
+
+    /// So many sequences before the record that begins are not sent. What its ring has left out is counted by the node
+    /// that did so; the next node is told what was sampled out.
+    fn pass(&mut self, gone: u64, left_out: Option<Missed>) {
+        let before = std::mem::replace(&mut self.left_out, left_out);
+        let between = left_out.zip(before).map_or_else(Missed::default, |(now, before)| now.since(&before));
+        let sampled = between.sampled.min(gone);
+        let lost = between.lost.min(gone - sampled);
+        self.sampled = self.sampled.wrapping_add(sampled as u32);
+        self.counts.lost.add(ReplicaLoss::Passed, gone - sampled - lost);
     }
 
     /// It is there; after an absence it may have missed anything, so the description and the newest record are for it.
@@ -160,6 +178,7 @@ impl Destination {
     /// Nothing that was sent counts any more: its records are others, or the node has none of them.
     pub(super) fn begin_anew(&mut self) {
         (self.under_way, self.sent, self.before, self.begun) = (None, None, None, [None; ASKED_MAX]);
+        self.left_out = None;
         self.again.iter_mut().for_each(Again::clear);
     }
 
@@ -252,7 +271,7 @@ impl Destination {
 
     /// It is not there, so nothing waits for it but the newest record. Older ones, from its first one on, are counted.
     pub(super) fn pass_over(&mut self, newest: Option<&RecordInfo>) {
-        (self.describing, self.is_absent) = (None, true);
+        (self.describing, self.is_absent, self.left_out) = (None, true, None);
         self.again.iter_mut().for_each(Again::drop_wanted);
         let (Some(newest), Some(next)) = (newest, self.next) else { return };
         let given_up = self.under_way.take().is_some_and(|(record, _)| record.sequence < newest.sequence);

@@ -27,13 +27,18 @@ use rohrpost_mailbox::{
 };
 use rtrb::Producer;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Places of open records. There is an older one only beside a newer one.
 const OLDER: usize = 0;
 const NEWER: usize = 1;
 
-/// A ring that cannot be opened or made is tried again after this, ns.
+/// A ring that cannot be opened or made is tried again after this, ns. By a line the next one is not opened, and no
+/// other description taken, before that either: the thread that does it has other ends as well, and files are slow.
 const RETRY_NS: u64 = 1_000_000_000;
+/// How long that thread waits for a process of this node that has the registry, at most. Others have more time.
+const LINE_PATIENCE: Duration = Duration::from_millis(5);
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Where and when a part is taken.
 #[derive(Clone, Copy)]
@@ -68,6 +73,11 @@ pub(super) struct IncomingReplica {
     unanswered: Option<Unanswered>,
     /// The ring could not be opened or made, and is not tried again before, ns.
     retry_ns: u64,
+    /// By a line: no other ring is opened before, and no other description taken before, ns.
+    open_ns: u64,
+    describe_ns: u64,
+    /// It comes by a session, of which the thread has others as well.
+    by_line: bool,
     /// None: nothing is asked for.
     requests: Option<Producer<OutgoingRequest>>,
     /// A request waits to be sent.
@@ -96,11 +106,33 @@ impl IncomingReplica {
             answer_time: AnswerTime::default(),
             unanswered: None,
             retry_ns: 0,
+            open_ns: 0,
+            describe_ns: 0,
+            by_line: false,
             requests: None,
             has_asked: false,
             told: false,
             delays: DelayAlarm::default(),
         }
+    }
+
+    /// The same by a line.
+    pub(super) fn by_line(self) -> Self {
+        Self { by_line: true, ..self }
+    }
+
+    /// How long a process of this node that has the registry is waited for.
+    pub(super) fn patience(&self) -> Duration {
+        if self.by_line { LINE_PATIENCE } else { PATIENCE }
+    }
+
+    /// Whether another description may be taken now; then none is for a while.
+    pub(super) fn may_describe(&mut self, now_ns: u64) -> bool {
+        let may = !self.by_line || now_ns >= self.describe_ns;
+        if may {
+            self.describe_ns = now_ns.saturating_add(RETRY_NS);
+        }
+        may
     }
 
     /// From now on missing parts are asked for, unless the configuration says never.
@@ -218,14 +250,14 @@ impl IncomingReplica {
         if record.sequence < next {
             self.close_ring();
         }
-        let mut written = self.write(now.participant, id, record);
+        let mut written = self.write(now, id, record);
         if matches!(written, Err(Some(_))) && self.writer.is_some() && self.life != Some(life) {
             // Its time may have begun anew, too: what is there then fits no more.
             self.close_ring();
             if let Err(error) = now.participant.node().remove_orphan_stream(id) {
                 self.tell(&format!("its ring of an earlier time cannot be removed: {error}"));
             }
-            written = self.write(now.participant, id, record);
+            written = self.write(now, id, record);
         }
         if let Err(why) = written {
             if self.writer.is_none() {
@@ -255,7 +287,7 @@ impl IncomingReplica {
         if !has_room || is_over || record.sequence == self.open[NEWER].sequence || self.requests.is_none() {
             return self.late(now.ns, life, record.sequence);
         }
-        if let Err(why) = self.write(now.participant, id, record) {
+        if let Err(why) = self.write(now, id, record) {
             if why.is_none() {
                 // Readers hold all frames but one, so no answer can be taken: nothing waits for one.
                 self.give_up(OLDER);
@@ -282,16 +314,16 @@ impl IncomingReplica {
 
     /// Begins a record in the ring, which is opened if it is not yet; or why that is not possible, with no writer if it
     /// is not open. Without room beside the older one that is given up; none: there is no room for an older one.
-    fn write(
-        &mut self,
-        participant: &Arc<Participant>,
-        id: StreamId,
-        record: OriginRecord,
-    ) -> Result<(), Option<String>> {
+    fn write(&mut self, now: Now<'_>, id: StreamId, record: OriginRecord) -> Result<(), Option<String>> {
         let mut writer = match self.writer.take() {
             Some(writer) => writer,
+            None if self.by_line && now.ns < self.open_ns => {
+                return Err(Some("its stream was made anew more than once a second".into()));
+            }
             None => {
-                let opened = participant.replica_writer(id, self.settings.shape, record.sequence);
+                self.open_ns = now.ns.saturating_add(RETRY_NS);
+                let (shape, first) = (self.settings.shape, record.sequence);
+                let opened = now.participant.replica_writer_within(id, shape, first, self.patience());
                 opened.map_err(|error| Some(error.to_string()))?
             }
         };

@@ -20,6 +20,7 @@ use super::{Describe, LINE_PART_BYTES, LINE_PART_ROOM, ReplicaSettings};
 use crate::counts::Count;
 use crate::frame::{FrameKind, NodeIndex, ReplicaFrame};
 use rohrpost_mailbox::{Name, Participant, StreamReader, SystemTime};
+use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 /// Modules that have begun are looked for this often, ns.
@@ -154,11 +155,19 @@ impl LineReplicas {
         }
     }
 
-    /// Whether something waits for a node.
-    pub fn waits_for(&self, node: NodeIndex) -> bool {
-        let all = self.destinations.iter().filter(|destination| destination.node == node);
-        let mut streams = all.flat_map(|destination| &destination.streams.streams);
-        streams.any(|stream| stream.destinations.iter().any(|to| stream.waits_for(to)))
+    /// Whether there is something to look at for a node: its next part, or records that sampling leaves out.
+    pub fn is_behind(&self, node: NodeIndex) -> bool {
+        self.streams_to(node).any(|stream| stream.destinations.iter().any(|to| stream.is_behind(to)))
+    }
+
+    /// Whether a part waits for a node.
+    pub fn waits_for(&self, now_ns: u64, node: NodeIndex) -> bool {
+        self.streams_to(node).any(|stream| stream.destinations.iter().any(|to| stream.waits_for(now_ns, to)))
+    }
+
+    fn streams_to(&self, node: NodeIndex) -> impl Iterator<Item = &OutgoingReplica> {
+        let all = self.destinations.iter().filter(move |destination| destination.node == node);
+        all.flat_map(|destination| &destination.streams.streams)
     }
 
     /// Writes the next part for a node: its kind and length. None: there is none.
@@ -166,10 +175,23 @@ impl LineReplicas {
     /// # Panics
     /// When `content` has less than [`LINE_PART_ROOM`] bytes.
     pub fn next(&mut self, now_ns: u64, node: NodeIndex, content: &mut [u8]) -> Option<(FrameKind, usize)> {
+        self.next_before(now_ns, (node, LEVELS as u8), content)
+    }
+
+    /// The same of streams that are more important than this level.
+    ///
+    /// # Panics
+    /// When `content` has less than [`LINE_PART_ROOM`] bytes.
+    pub fn next_before(
+        &mut self,
+        now_ns: u64,
+        (node, level): (NodeIndex, u8),
+        content: &mut [u8],
+    ) -> Option<(FrameKind, usize)> {
         let content = &mut content[..LINE_PART_ROOM];
         let destination = self.destinations.iter_mut().find(|destination| destination.node == node)?;
         loop {
-            let (at, to) = destination.streams.choose(now_ns, 1 << node)?;
+            let (at, to) = destination.streams.choose_before(now_ns, 1 << node, level)?;
             // What is held is there; but a stream that was made anew takes it along, and another one is chosen.
             let stream = &mut destination.streams.streams[at];
             if let Some(filled) = stream.fill(now_ns, &self.time, (to, LINE_PART_BYTES), content) {

@@ -53,6 +53,7 @@ pub use counts::{ReceivedReplica, ReplicaCounts, ReplicaLoss, ReplicaLosses, Sen
 pub use line::{LineReplicas, TellsTime};
 pub use receiving::ReplicaReceiver;
 pub use requests::PartRequests;
+pub use rohrpost_network::LINE_PART_BYTES;
 pub use sending::{ReplicaSender, ReplicaStep};
 pub use settings::{LineSettings, ReplicaSettings};
 
@@ -62,8 +63,6 @@ use crate::settings::Settings;
 /// Descriptions are sent this often to each node that has a replica.
 pub const DESCRIBE_EVERY_NS: u64 = 1_000_000_000;
 
-/// Bytes of each part of a record but the last. An important package waits for no more than one part that is ready.
-pub const LINE_PART_BYTES: usize = 4096;
 /// A part with its head, at most.
 pub const LINE_PART_ROOM: usize = RECORD_PART_HEAD_BYTES + LINE_PART_BYTES;
 /// Descriptions are sent when a node comes and when they change; and this often, if the other end could not use one.

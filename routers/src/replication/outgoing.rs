@@ -8,6 +8,7 @@ use super::peers::Peers;
 use super::settings::ReplicaSettings;
 use super::{DESCRIBE_EVERY_NS, Describe, LINE_DESCRIBE_EVERY_NS, LINE_PART_BYTES};
 use crate::frame::{DESCRIPTION_BYTES_MAX, FrameKind, NodeIndex, PartRequest, RECORD_PART_HEAD_BYTES, RecordPart};
+use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Participant, RecordInfo, StreamId, StreamReader, SystemTime};
 use std::sync::Arc;
 
@@ -195,10 +196,23 @@ impl OutgoingReplica {
         })
     }
 
-    /// Whether something waits for this destination.
-    pub(super) fn waits_for(&self, to: &Destination) -> bool {
-        let is_behind = self.newest.is_some_and(|newest| to.next.is_none_or(|next| next <= newest.sequence));
-        let has_some = to.describing.is_some() || to.is_asked() || to.under_way.is_some() || is_behind;
+    /// Whether there is something to look at for this destination: what it gets next, or what sampling leaves out.
+    pub(super) fn is_behind(&self, to: &Destination) -> bool {
+        self.has_more(to, |newest, next| next <= newest)
+    }
+
+    /// Whether something waits to leave for it. Of records that are sent only if they changed, any may.
+    pub(super) fn waits_for(&self, now_ns: u64, to: &Destination) -> bool {
+        self.has_more(to, |newest, next| match self.settings.sampling {
+            Sampling::Every(every) if !to.has_none => newest - newest % u64::from(every.max(1)) >= next,
+            Sampling::Rate(_) if !to.has_none => next <= newest && now_ns >= to.sample_ns,
+            _ => next <= newest,
+        })
+    }
+
+    fn has_more(&self, to: &Destination, has_next: impl Fn(u64, u64) -> bool) -> bool {
+        let has_next = self.newest.is_some_and(|newest| has_next(newest.sequence, to.next.unwrap_or(newest.sequence)));
+        let has_some = to.describing.is_some() || to.is_asked() || to.under_way.is_some() || has_next;
         self.reader.is_some() && !to.is_absent && has_some
     }
 

@@ -14,6 +14,7 @@ use crate::frame::{DescriptionPart, FrameHead, NodeIndex, ReplicaFrame};
 use crate::settings::Settings;
 use rohrpost_mailbox::{Name, NodeError, Participant, StreamId, SystemTime};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What time alone makes due is looked at this often, ns: it is due after milliseconds.
 const LOOK_EVERY_NS: u64 = 500_000;
@@ -51,7 +52,9 @@ impl ReplicaReceiver {
         participant: Arc<Participant>,
         describe: Arc<dyn Describe>,
     ) -> Self {
-        Self::of((own, LINE_PART_BYTES), replicas, participant, describe)
+        let made = Self::of((own, LINE_PART_BYTES), replicas, participant, describe);
+        let streams = made.streams.into_iter().map(|stream| stream.map(IncomingReplica::by_line)).collect();
+        Self { streams, ..made }
     }
 
     fn of(
@@ -124,7 +127,7 @@ impl ReplicaReceiver {
                 self.waits |= stream.waits(now_ns);
                 self.rings |= std::mem::take(&mut stream.has_asked);
             }
-            ReplicaFrame::Description(part) => self.describe(router, part),
+            ReplicaFrame::Description(part) => self.describe(now_ns, router, part),
             ReplicaFrame::Request(_) => {}
         }
         true
@@ -156,7 +159,7 @@ impl ReplicaReceiver {
         std::mem::take(&mut self.rings)
     }
 
-    fn describe(&mut self, router: u64, part: &DescriptionPart<'_>) {
+    fn describe(&mut self, now_ns: u64, router: u64, part: &DescriptionPart<'_>) {
         let Some(Some(stream)) = self.streams.get_mut(usize::from(part.place)) else { return };
         let life = Life { router, generation: part.generation };
         if stream.is_over(life) {
@@ -167,12 +170,16 @@ impl ReplicaReceiver {
             return;
         }
         let Some(words) = stream.assembly.take(part) else { return };
+        if !stream.may_describe(now_ns) {
+            return stream.lose(ReplicaLoss::Undescribed);
+        }
         let Some(number) = self.describe.number(&words, &stream.settings.item) else {
             stream.lose(ReplicaLoss::Undescribed);
             return stream.tell("the description that came with it names no such stream");
         };
         let name = stream.settings.from;
-        let laid = self.lay_down(name, &words);
+        let patience = stream.patience();
+        let laid = self.lay_down(name, &words, patience);
         let Some(Some(stream)) = self.streams.get_mut(usize::from(part.place)) else { return };
         match laid {
             Ok(()) => stream.is_described(KnownOrigin { check: part.check, id: StreamId { name, number } }),
@@ -182,7 +189,7 @@ impl ReplicaReceiver {
 
     /// Lays a module's description down here, unless it is there. Records that were written by another one are not read
     /// by this one: their rings go.
-    fn lay_down(&mut self, module: Name, words: &[u8]) -> Result<(), NodeError> {
+    fn lay_down(&mut self, module: Name, words: &[u8], patience: Duration) -> Result<(), NodeError> {
         let node = self.participant.node();
         if node.about(module).as_deref() == Some(words) {
             return Ok(());
@@ -190,7 +197,7 @@ impl ReplicaReceiver {
         let all = self.streams.iter_mut().flatten().filter(|stream| stream.settings.from == module);
         all.for_each(IncomingReplica::forget);
         for id in node.streams()?.into_iter().filter(|id| id.name == module) {
-            node.remove_orphan_stream(id)?;
+            node.remove_orphan_stream_within(id, patience)?;
         }
         self.participant.describe_replicas(module, words)
     }

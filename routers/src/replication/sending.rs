@@ -148,7 +148,7 @@ impl ReplicaSender {
     fn wait(&self, now_ns: u64) -> ReplicaStep {
         let all =
             || self.by_level.streams.iter().flat_map(|stream| stream.destinations.iter().map(move |to| (stream, to)));
-        if all().any(|(stream, to)| stream.waits_for(to)) {
+        if all().any(|(stream, to)| stream.is_behind(to)) {
             // For room in a socket: that is known elsewhere.
             return ReplicaStep::Wait { until_ns: u64::MAX };
         }

@@ -13,6 +13,7 @@ mod requests;
 mod sealed;
 mod slow;
 mod stepped;
+mod two_hops;
 
 use super::{Describe, ReceivedReplica, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};

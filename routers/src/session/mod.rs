@@ -15,8 +15,9 @@
 //! nobody can use more than its share of places, ranges, memory or line by connecting more often: shares go by
 //! principal.
 //!
-//! Replicas go by the same streams: a part is made ready when nothing else is, and no package waits. So a package waits
-//! for one part at most, and no queue holds records: see [`LineReplicas`].
+//! Replicas go by the same streams: a part is made ready when nothing else is. While packages wait, that is one between
+//! two batches of them, if it is more important or they are of another party. So a package waits for one part at most,
+//! and no queue holds records: see [`LineReplicas`].
 
 pub mod client;
 mod counts;

@@ -63,6 +63,8 @@ pub(super) struct Outgoing {
     quota_bytes: usize,
     /// Bytes that are made ready at a time.
     batch_bytes: usize,
+    /// A part of a replica left last: the packages that wait have their turn.
+    is_part_last: bool,
     empty_looks: u8,
 }
 
@@ -78,6 +80,7 @@ impl Outgoing {
             queue: None,
             quota_bytes,
             batch_bytes,
+            is_part_last: false,
             empty_looks: 0,
         }
     }
@@ -192,17 +195,28 @@ impl Outgoing {
         self.queue = Some(queue);
     }
 
-    /// Makes a part of a replica ready, if nothing else is and nothing waits. `write` puts what follows the head of the
-    /// frame into the room that it gets, and says how long it is; none: there is none.
-    pub(super) fn add_part(&mut self, room: usize, write: impl FnOnce(&mut [u8]) -> Option<(SessionFrameKind, usize)>) {
-        if !self.ready().is_empty() || self.has_waiting() {
-            return;
+    /// Makes a part of a replica ready, if nothing else is. While packages wait, a batch of them and a part have turns:
+    /// a part of what is more important than they are, or any beside those of another `party` than its own. `write`
+    /// puts what follows the head of the frame into the room that it gets, of a level before the one that it gets, and
+    /// says how long it is; none: there is none. Whether one was made.
+    pub(super) fn add_part(
+        &mut self,
+        (room, party): (usize, u32),
+        write: impl FnOnce(u8, &mut [u8]) -> Option<(SessionFrameKind, usize)>,
+    ) -> bool {
+        let first = self.queue.as_ref().and_then(|queue| Some(queue.at(queue.first_shared(self.batch_bytes as u64)?)));
+        if !self.ready().is_empty() || (first.is_some() && self.is_part_last) {
+            return false;
         }
+        let before = first.filter(|first| first.share.party == party).map_or(LEVELS as u8, |first| first.level);
         self.forget_taken();
         self.ready.resize(HEAD_BYTES + room, 0);
-        let made = write(&mut self.ready[HEAD_BYTES..]);
+        let made = write(before, &mut self.ready[HEAD_BYTES..]);
         self.ready.truncate(made.map_or(0, |(_, length)| HEAD_BYTES + length));
-        made.into_iter().for_each(|(kind, length)| write_head(kind, length, &mut self.ready));
+        let Some((kind, length)) = made else { return false };
+        write_head(kind, length, &mut self.ready);
+        self.is_part_last = true;
+        true
     }
 
     /// Gives up what waited too long. `cause`: why it did.
@@ -258,6 +272,7 @@ impl Outgoing {
 
     fn make_ready(&mut self, shift_ns: i64, parcel: &Parcel<'_>, fates: &mut impl Fates) {
         self.forget_taken();
+        self.is_part_last = false;
         let Parcel { head, body, published_ns, hops, .. } = *parcel;
         // 0 says that nobody knows.
         let published_ns = published_ns.saturating_add_signed(shift_ns).max(1);

@@ -5,6 +5,8 @@
 
 use super::StreamReader;
 use crate::stream::error::StreamError;
+use crate::stream::omission::LeftOut;
+use crate::stream::missed::Missed;
 use crate::stream::record::{HeldRecord, RecordInfo};
 use crate::stream::ring::Look;
 
@@ -54,6 +56,13 @@ impl StreamReader {
         if let Some((place, _)) = self.place.as_ref().zip(self.kept.take()) {
             place.ring().release(place.seat);
         }
+    }
+
+    /// What the ring has left out before this record since it began, lost or sampled out; none when it is there no
+    /// more, or not yet. Only rings of replicas leave out some.
+    pub fn left_out_before(&self, sequence: u64) -> Option<Missed> {
+        let LeftOut { lost, sampled } = self.place.as_ref()?.ring().left_out_before(sequence)?;
+        Some(Missed { lost, sampled, passed_over: 0 })
     }
 
     /// The record of this sequence, to read in place; none when it is there no more, or not yet. The position stays.

@@ -1,7 +1,7 @@
 //! Records of another node: in order, whole, two at a time, and what is not there is told.
 
 use super::*;
-use crate::node::Node;
+use crate::node::{Node, RegistryLock};
 use crate::stream::error::WriteError;
 use crate::stream::missed::Missed;
 use crate::stream::reader::StreamReader;
@@ -290,4 +290,17 @@ fn what_does_not_fit_is_not_written() {
     assert!(matches!(replica.begin(unstamped), Err(ReplicaError::Write(WriteError::Unstamped(_)))));
     let past = OriginRecord { sequence: SEQUENCE_MAX + 1, len_bytes: 8, ..record };
     assert!(matches!(replica.begin(past), Err(ReplicaError::Passed { .. })));
+}
+
+#[test]
+fn what_has_no_time_does_not_wait_for_a_process_that_has_the_registry() {
+    let (_folder, participant, id) = ground();
+    let first = |patience| participant.replica_writer_within(id, SHAPE, 3, patience).map(|replica| replica.next());
+    let registry = RegistryLock::take(participant.node().path()).unwrap();
+    let busy = first(Duration::ZERO);
+    assert!(matches!(busy, Err(StreamError::Node(NodeError::Busy(_)))), "{busy:?}");
+    let removed = participant.node().remove_orphan_stream_within(id, Duration::ZERO);
+    assert!(matches!(removed, Err(NodeError::Busy(_))), "{removed:?}");
+    drop(registry);
+    assert_eq!(first(Duration::ZERO).unwrap(), 3);
 }

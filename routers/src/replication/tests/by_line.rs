@@ -105,6 +105,18 @@ fn the_newest_of_what_waits_leaves_and_what_sampling_leaves_out_is_told_apart() 
         line.write(&burst);
         assert_eq!(line.carry(), second, "{sampling}, changed: {changed}");
         assert_eq!(line.left_out(), left_out, "{sampling}, changed: {changed}");
+        line.write(&burst[..1]);
+        line.here.refresh(line.now_ns);
+        // Twelve is one of three; a second has not passed.
+        let waits = !matches!(sampling, Sampling::Rate(_));
+        assert_eq!(line.here.waits_for(line.now_ns, LAPTOP), waits, "{sampling}");
+        assert!(line.here.is_behind(LAPTOP), "it is looked at nevertheless");
+        line.carry();
+        assert!(!line.here.waits_for(line.now_ns, LAPTOP) && !line.here.is_behind(LAPTOP), "{sampling}");
+        line.write(&burst[..1]);
+        line.here.refresh(line.now_ns);
+        let waits = waits && sampling != Sampling::Every(3);
+        assert_eq!(line.here.waits_for(line.now_ns, LAPTOP), waits, "{sampling}");
     }
     let mut line = Line::new(ReplicaSettings { sampling: Sampling::Every(3), ..image() });
     let sequences: Vec<u64> = (0..10)

@@ -75,8 +75,9 @@ fn said() -> Vec<Vec<u8>> {
         let body: Vec<u8> = (0..len).map(|at| (at * 7 + step as usize) as u8).collect();
         writer.write(at(100 + step), &body).unwrap();
         let left = origin.leave(&mut now_ns);
-        // The first part of each is lost, so requests go back.
-        holder.take_all(now_ns, &left[left.len().min(2) - 1..]);
+        // The description comes; then the first part of each is lost, so requests go back.
+        let lost = if step == 0 { 0 } else { left.len().min(2) - 1 };
+        holder.take_all(now_ns, &left[lost..]);
         all.extend(left);
         now_ns += 20 * MS;
         holder.pass(now_ns);

@@ -121,7 +121,7 @@ pub struct Client {
     is_slow: bool,
     /// Parts of replicas may leave and come.
     has_line: bool,
-    /// Some may wait.
+    /// Some wait.
     has_parts: bool,
     estimate: ServerClockEstimate,
     /// The end with these clocks.
@@ -346,6 +346,7 @@ impl Client {
         if self.is_blocked {
             return ClientStep::Wait { until_ns: self.look_ns };
         }
+        self.add_part(now_ns, host);
         self.refill(now_ns, host);
         self.add_part(now_ns, host);
         match self.outgoing.ready() {

@@ -87,11 +87,12 @@ impl Client {
         if is_there { replicas.came(now_ns, server) } else { replicas.left(now_ns, server) }
     }
 
-    /// Makes the next part of a replica ready, if nothing else is.
+    /// Makes the next part of a replica ready, if nothing else is, and no packages go first. Those of a node are of one
+    /// party.
     pub(super) fn add_part(&mut self, now_ns: u64, host: &mut impl ClientHost) {
         self.has_parts = false;
         let Some(server) = host.replicas().map(|replicas| replicas.server()).filter(|_| self.is_up()) else { return };
-        self.has_parts = add_part(&mut self.outgoing, now_ns, server, host);
+        (_, self.has_parts) = add_part(&mut self.outgoing, now_ns, (server, 0), host);
     }
 
     /// Does something with what leaves, and answers the commands of this end that are lost thereby.

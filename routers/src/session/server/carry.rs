@@ -126,7 +126,11 @@ impl Server {
             let refusal = SessionRefusal { version: VERSION, reason: refused.reason, yours, ours, text };
             member.outgoing.say(&SessionMessage::Refusal(refusal));
         }
-        self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.refill(now_ns, 0, ledger));
+        // What is ready leaves first where parts wait: behind it they would not be the newest any more.
+        let is_rest = self.member(client).is_some_and(|member| member.has_parts && !member.outgoing.ready().is_empty());
+        if !is_rest && !self.add_part(now_ns, client, host) {
+            self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.refill(now_ns, 0, ledger));
+        }
     }
 
     /// Does something with what leaves by a client's connection, and answers the commands that are lost thereby.

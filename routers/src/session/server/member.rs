@@ -103,8 +103,10 @@ pub(super) struct Member {
     pub(super) is_due: bool,
     /// The node that it is the client of, where that has replicas by it.
     pub(super) node: Option<NodeIndex>,
-    /// Parts of replicas may wait for it.
+    /// Parts of replicas wait for it.
     pub(super) has_parts: bool,
+    /// The turn in which it got one last.
+    pub(super) part_turn: u64,
 }
 
 impl Member {
@@ -138,6 +140,7 @@ impl Member {
             is_due: false,
             node: None,
             has_parts: false,
+            part_turn: 0,
         }
     }
 

@@ -90,6 +90,8 @@ pub enum ServerStep {
     Write(ClientIndex),
     /// Close the connection; the index is free.
     Close(ClientIndex),
+    /// All that was due has had its turn, and parts of replicas wait for the next one: take what came, then poll again.
+    Look,
     /// Nothing before this time, unless something comes.
     Wait {
         /// Ns of the monotonic clock.
@@ -148,6 +150,13 @@ pub struct Server {
     counts: SessionCounts,
     /// Clients for which something is to be done.
     due: VecDeque<ClientIndex>,
+    /// Counts the turns: in one, all that is due is done, and each client gets a part of a replica at most. So what
+    /// comes is never read more often than all packages that wait have left, as far as lines take them.
+    turn: u64,
+    /// The next one begins.
+    is_turn_over: bool,
+    /// Parts wait for it.
+    has_put_off: bool,
     registering: Registering,
     time: Option<TimeRecord>,
     look_ns: u64,
@@ -164,6 +173,9 @@ impl Server {
             table: RoutingTable::default(),
             counts: SessionCounts::default(),
             due: VecDeque::new(),
+            turn: 0,
+            is_turn_over: true,
+            has_put_off: false,
             registering: Registering::default(),
             time: None,
             look_ns: 0,
@@ -308,7 +320,10 @@ impl Server {
             self.look_ns = now_ns + LOOK_EVERY_NS;
             self.look(now_ns, host);
         }
-        self.look_for_parts(now_ns, host);
+        if std::mem::take(&mut self.is_turn_over) {
+            self.turn += 1;
+            self.look_for_parts(now_ns, host);
+        }
         while let Some(client) = self.due.pop_front() {
             let Some(member) = self.member_mut(client) else { continue };
             member.is_due = false;
@@ -326,6 +341,10 @@ impl Server {
                 }
                 _ => {}
             }
+        }
+        self.is_turn_over = true;
+        if std::mem::take(&mut self.has_put_off) {
+            return ServerStep::Look;
         }
         ServerStep::Wait { until_ns: self.look_ns }
     }

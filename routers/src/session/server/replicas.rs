@@ -12,21 +12,31 @@ impl Server {
         let Some(replicas) = host.replicas() else { return };
         replicas.refresh(now_ns);
         for (node, name) in replicas.nodes() {
-            if let Some(client) = self.table.client_of(*name).filter(|_| replicas.waits_for(*node)) {
-                self.member_mut(client).into_iter().for_each(|member| member.has_parts = true);
+            let Some(client) = self.table.client_of(*name) else { continue };
+            let waits = replicas.waits_for(now_ns, *node);
+            self.member_mut(client).into_iter().for_each(|member| member.has_parts = waits);
+            if replicas.is_behind(*node) {
                 self.is_due(client);
             }
         }
     }
 
-    /// Makes the next part for a client ready, if nothing else is.
-    pub(super) fn add_part(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) {
-        let Some(member) = self.member_mut(client).filter(|member| member.has_parts && member.is_member()) else {
-            return;
-        };
-        if let Some(node) = member.node.filter(|_| member.outgoing.ready().is_empty()) {
-            member.has_parts = add_part(&mut member.outgoing, now_ns, node, host);
+    /// Makes the next part for a client ready, if nothing else is, no packages go first, and it got none in this turn.
+    /// Whether one was made.
+    pub(super) fn add_part(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) -> bool {
+        let (turn, party) = (self.turn, self.settings.system.map_or(0, |(system, _)| system.into()));
+        let Some(member) = self.member_mut(client).filter(|member| member.is_member()) else { return false };
+        let Some(node) = member.node.filter(|_| member.outgoing.ready().is_empty()) else { return false };
+        if member.part_turn == turn {
+            self.has_put_off |= member.has_parts;
+            return false;
         }
+        let (is_made, has_parts) = add_part(&mut member.outgoing, now_ns, (node, party), host);
+        member.has_parts = has_parts;
+        if is_made {
+            member.part_turn = turn;
+        }
+        is_made
     }
 
     /// A client may host other names now: it may be a node by now, or may have been one.

@@ -152,6 +152,7 @@ impl Ground {
                         client.closed(self.now_ns, notes);
                     }
                 }
+                server::ServerStep::Look => {}
                 server::ServerStep::Wait { .. } => return,
             }
         }

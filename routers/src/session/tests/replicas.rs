@@ -1,6 +1,7 @@
 //! Replicas by sessions, in simulated networks and with hostile ends.
 
 mod hostile;
+mod turns;
 
 use super::ground::{Ground, Notes};
 use super::plan::{Plan, client_settings, ranges, server_settings};
@@ -105,7 +106,12 @@ fn behind_the_last_part_nothing_waits() {
     let mut waited: BTreeMap<ClientIndex, Vec<bool>> = BTreeMap::new();
     for ms in [100, 200, 300] {
         assert!(ground.said.rings.as_mut().unwrap().write(ms));
-        while let ServerStep::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) {
+        loop {
+            let index = match ground.server.poll(ground.now_ns, &mut ground.said) {
+                ServerStep::Write(index) => index,
+                ServerStep::Look => continue,
+                ServerStep::Close(_) | ServerStep::Wait { .. } => break,
+            };
             waited.entry(index).or_default().push(ground.server.has_waiting(index));
             let bytes = ground.server.ready(index).len();
             ground.server.took(ground.now_ns, index, bytes);

@@ -187,13 +187,8 @@ impl ServerThread {
                 self.server.end(now_ns, &mut self.host);
             }
             match self.server.poll(now_ns, &mut self.host) {
-                ServerStep::Write(client) => {
-                    self.write(client);
-                    // However many parts there are to send, what comes has its turn.
-                    if self.watches.is_some() {
-                        self.look(&mut events, EpollTimeout::ZERO);
-                    }
-                }
+                ServerStep::Write(client) => self.write(client),
+                ServerStep::Look => self.look(&mut events, EpollTimeout::ZERO),
                 ServerStep::Close(client) => self.close(client),
                 ServerStep::Wait { .. } if ending && self.connections.iter().all(Option::is_none) => return,
                 ServerStep::Wait { until_ns } => self.sleep(&mut events, until_ns.min(say_ns)),

@@ -5,6 +5,7 @@ use crate::replication::{LINE_PART_BYTES, ReplicaLoss};
 use crate::session::frame::SessionMessage;
 use crate::session::tests::ground::{Ground, Notes};
 use crate::session::tests::plan::{client_settings, ranges, server_settings};
+use crate::session::tests::world::S;
 use crate::session::tests::world::rings::{BACK, PICTURE, Rings, SERVER};
 
 const WORDS: [u8; 100] = [3; 100];
@@ -140,4 +141,35 @@ fn a_node_that_is_another_client_by_now_gets_nothing_any_more() {
     let bytes = [7; LINE_PART_BYTES];
     ground.takes(WRITER, &SessionMessage::Record(part(&bytes)));
     assert_eq!(ground.lost(ReplicaLoss::Foreign), 1, "it is not that node without its name");
+}
+
+/// Each would make a ring, in the thread that all clients share.
+#[test]
+fn a_stream_that_is_made_anew_all_the_time_is_so_once_a_second() {
+    let mut ground = ground();
+    ground.takes(WRITER, &SessionMessage::Description(description()));
+    let anew = |number: u16| RecordPart {
+        generation: number,
+        len: 1,
+        sequence: 0,
+        stamp_ns: 5 + u64::from(number),
+        ..part(&[7])
+    };
+    for second in 1..=3 {
+        for number in 0..100 {
+            ground.takes(WRITER, &SessionMessage::Record(anew(1000 * second + number)));
+        }
+        let lost = ground.lost(ReplicaLoss::Unwritable);
+        assert_eq!((ground.records(), lost), (second.into(), 99 * u64::from(second)));
+        ground.now_ns += S;
+    }
+    // So are descriptions, of which each takes all rings of its module away.
+    let lost = ground.lost(ReplicaLoss::Undescribed);
+    for number in 0..10 {
+        let bytes = [100 + number; 100];
+        let described =
+            DescriptionPart { generation: 4000, check: crc32fast::hash(&bytes), bytes: &bytes, ..description() };
+        ground.takes(WRITER, &SessionMessage::Description(described));
+    }
+    assert_eq!(ground.lost(ReplicaLoss::Undescribed), lost + 9);
 }

@@ -239,6 +239,7 @@ impl World {
                     connection.index = None;
                     connection.down.is_closed = true;
                 }
+                server::ServerStep::Look => {}
                 server::ServerStep::Wait { until_ns } => {
                     assert!(until_ns > now_ns && until_ns <= now_ns + LOOK_EVERY_NS);
                     self.server_wake_ns = until_ns;
