@@ -102,6 +102,7 @@ impl World {
                     self.server.took(self.now_ns, client, taken);
                 }
                 ServerStep::Close(client) => self.connections.retain(|known| *known != client),
+                ServerStep::Look => return,
                 ServerStep::Wait { until_ns } => return assert!(until_ns > self.now_ns),
             }
         }

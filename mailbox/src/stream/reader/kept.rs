@@ -5,8 +5,8 @@
 
 use super::StreamReader;
 use crate::stream::error::StreamError;
-use crate::stream::omission::LeftOut;
 use crate::stream::missed::Missed;
+use crate::stream::omission::LeftOut;
 use crate::stream::record::{HeldRecord, RecordInfo};
 use crate::stream::ring::Look;
 

@@ -47,8 +47,14 @@ pub(crate) const LINE: Group = Group {
                 ),
                 edit(
                     "session/outgoing.rs",
-                    "if !self.ready().is_empty() || self.has_waiting() {",
-                    "if !self.ready().is_empty() || self.has_waiting() && !broken!(LeavesPackagesWaiting) {",
+                    r"|| (first.is_some() && self.is_part_last) {
+            return false;
+        }
+        let before = first",
+                    r"|| (first.is_some() && self.is_part_last && !broken!(LeavesPackagesWaiting)) {
+            return false;
+        }
+        let before = first.filter(|_| !broken!(LeavesPackagesWaiting))",
                 ),
             ],
         },
@@ -71,12 +77,12 @@ pub(crate) const LINE: Group = Group {
                        records_are_whole_or_told_and_the_newest_is_next_whatever_goes_wrong",
             edits: &[edit(
                 "replication/destination.rs",
-                "let (lost, mut next) = (&self.counts.lost, self.next.unwrap_or(newest.sequence));",
+                "let (mut next, mut gone) = (self.next.unwrap_or(newest.sequence), 0);",
                 r"let mut newest = *newest;
         if broken!(BeginsWithOlder) && self.has_none {
             newest.sequence = newest.sequence.saturating_sub(1);
         }
-        let (lost, mut next) = (&self.counts.lost, self.next.unwrap_or(newest.sequence));",
+        let (mut next, mut gone) = (self.next.unwrap_or(newest.sequence), 0);",
             )],
         },
     ],
