@@ -9,6 +9,7 @@ use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 
 const DEMO: &str = include_str!("../../../config/demo.toml");
 const NODES: &str = include_str!("../../../config/demo-nodes.toml");
+const BEYOND: &str = include_str!("../../../config/demo-tcp.toml");
 const LOGD: &str = r#"
 [[module]]
 name = "logd.0"
@@ -78,7 +79,7 @@ fn names(installation: &Installation) -> Vec<String> {
 
 #[test]
 fn one_player_has_the_names_of_all_that_was_recorded() {
-    for (text, keep) in [(DEMO, 1024), (NODES, 64)] {
+    for (text, keep) in [(DEMO, 1024), (NODES, 1024), (BEYOND, 64)] {
         let (installation, played) = made(text, &demo_modules(), &[], &[]);
         assert_eq!(names(&installation), ["replay.0", "laser.0", "mapper.0", "motor.0", "odometry.0"]);
         assert_eq!(installation.time, rohrpost_config::TimeSource::Log);
