@@ -56,6 +56,11 @@ pub(crate) const LINE: Group = Group {
         }
         let before = first.filter(|_| !broken!(LeavesPackagesWaiting))",
                 ),
+                edit(
+                    "session/server/replicas.rs",
+                    "if member.part_turn == turn {",
+                    "if member.part_turn == turn && !broken!(LeavesPackagesWaiting) {",
+                ),
             ],
         },
         Planted {

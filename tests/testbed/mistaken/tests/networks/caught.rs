@@ -160,7 +160,7 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::SaysSampled, Promise::RecordAccounts, Network::Replicated, 1),
     caught(Mistake::CountsRecordsTwice, Promise::RecordAccounts, Network::Replicated, 1),
     caught(Mistake::ForgetsOverwritten, Promise::RecordAccounts, Network::Replicated, 26),
-    caught(Mistake::AsksForEver, Promise::RecordBounds, Network::Replicated, 1),
+    caught(Mistake::AsksForEver, Promise::RecordBounds, Network::Replicated, 34),
     caught(Mistake::RepeatsForEver, Promise::RecordBounds, Network::Replicated, 1),
     caught(Mistake::PartsUnpaced, Promise::RecordBounds, Network::Replicated, 1),
     caught(Mistake::OverrunsWithPart, Promise::InWindow, Network::SlottedReplicated, 1),

@@ -145,7 +145,7 @@ impl ReceivedAccount {
     fn is_up_to_date(&self, io: &Io<'_>, rings: &Rings) -> Result<(), String> {
         let place = usize::from(self.counts.place);
         let (its, books) = (&io.plan.streams[place], &io.oracle.records);
-        let Some((sequence, newest)) = books.newest(place) else { return Ok(()) };
+        let Some((sequence, newest)) = books.newest(place).filter(|_| its.is_carried) else { return Ok(()) };
         let Some(there) = self.ring(io, rings).and_then(|ring| ring.newest) else {
             return Err(format!("{sequence} was written, and none came"));
         };

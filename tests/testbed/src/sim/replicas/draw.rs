@@ -50,6 +50,7 @@ impl Plan {
                 period_ns: 10 * MS,
                 bytes: (record_bytes.into(), record_bytes.into()),
                 same_percent: 0,
+                is_carried: false,
                 readers: vec![((node + 1) % self.nodes.len(), 20 * MS)],
             });
         }
@@ -97,6 +98,7 @@ impl Plan {
             period_ns,
             bytes: (least, most),
             same_percent: chance.pick(&[0, 0, 50]),
+            is_carried: true,
             readers: readers.into_iter().map(|node| (node, chance.scale(MS, 300 * MS))).collect(),
         }
     }

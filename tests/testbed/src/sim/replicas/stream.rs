@@ -27,6 +27,8 @@ pub struct StreamPlan {
     pub bytes: (u64, u64),
     /// Of a hundred records, those with the bytes of the one before.
     pub same_percent: u64,
+    /// Whether the wire carries it; else its records may all be overwritten while they leave.
+    pub is_carried: bool,
     /// Node and pause between two looks of each reader, ns.
     pub readers: Vec<(usize, u64)>,
 }
