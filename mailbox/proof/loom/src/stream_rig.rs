@@ -2,7 +2,7 @@
 //! the models.
 
 use crate::step::reached;
-use crate::stream::missed::{Missed, MissedAccount};
+use crate::stream::missed::MissedAccount;
 use crate::stream::omission::LeftOut;
 use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};
 use crate::stream::writing::Progress;
@@ -117,15 +117,20 @@ pub(crate) struct Reader {
     pub(crate) next: u64,
     pub(crate) read: u64,
     pub(crate) lost: u64,
-    pub(crate) missed: MissedAccount,
+    /// None: causes are not asked for. Each look that they take multiplies the interleavings.
+    pub(crate) missed: Option<MissedAccount>,
 }
 
 impl Reader {
     pub(crate) fn new(stream: &Arc<Stream>, seat: usize) -> Self {
-        let mut reader =
-            Self { stream: stream.clone(), seat, next: 0, read: 0, lost: 0, missed: MissedAccount::default() };
-        reader.missed.begin(&stream.ring(), 0);
-        reader
+        Self { stream: stream.clone(), seat, next: 0, read: 0, lost: 0, missed: None }
+    }
+
+    /// One that tells what it missed by cause.
+    pub(crate) fn telling(stream: &Arc<Stream>, seat: usize) -> Self {
+        let mut missed = MissedAccount::default();
+        missed.begin(&stream.ring(), 0);
+        Self { missed: Some(missed), ..Self::new(stream, seat) }
     }
 
     /// As `StreamReader::advance`; false when there is nothing.
@@ -137,10 +142,13 @@ impl Reader {
                 assert_eq!(line.sequence, self.next);
                 self.next += 1;
                 self.read += 1;
-                self.missed.come_to(line.about.left_out);
+                self.missed.iter_mut().for_each(|missed| missed.come_to(line.about.left_out));
             }
             Look::There(_) | Look::Gone => {
-                let oldest = self.missed.miss(&ring, self.seat, self.next);
+                let oldest = match &mut self.missed {
+                    Some(missed) => missed.miss(&ring, self.seat, self.next),
+                    None => ring.oldest_after(self.next),
+                };
                 assert!(oldest > self.next, "overwritten, and not told so");
                 self.lost += oldest - self.next;
                 self.next = oldest;
@@ -155,16 +163,11 @@ impl Reader {
     }
 
     /// Everything that was written was read or lost.
-    pub(crate) fn settle(self, written: u64, bytes: Bytes) {
-        self.account(written, bytes);
-    }
-
-    /// The same, and what was missed by cause.
-    pub(crate) fn account(mut self, written: u64, bytes: Bytes) -> Missed {
+    pub(crate) fn settle(mut self, written: u64, bytes: Bytes) {
         self.catch_up(bytes);
         assert_eq!((self.read + self.lost, self.next), (written, written), "the accounts are wrong");
-        assert_eq!(self.missed.missed().all(), self.lost, "some were missed without a cause");
-        self.missed.missed()
+        let missed = self.missed.map_or(self.lost, |missed| missed.missed().all());
+        assert_eq!(missed, self.lost, "some were missed without a cause");
     }
 }
 
