@@ -17,8 +17,8 @@ pub use router::{
 pub use slots::{SlotState, SlotUse, TunnelState};
 
 pub use tcp::{
-    BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondLink, BeyondOutage, BeyondState,
-    BeyondTime, ClassPassed, Tcp, TcpInterface, TcpProxy,
+    BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondLink, BeyondNode, BeyondOutage,
+    BeyondState, BeyondStream, BeyondStreams, BeyondTime, ClassPassed, Tcp, TcpInterface, TcpProxy,
 };
 
 use crate::interface;

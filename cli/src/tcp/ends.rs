@@ -1,11 +1,12 @@
 //! Code that the modules of the TCP router and of its clients share.
 
 use crate::router::replicas::{Descriptions, of};
-use rohrpost::ModuleError;
-use rohrpost::interfaces::{CarriedLoss, ClassPassed, ReplicaStates};
+use rohrpost::interfaces::{BeyondNode, BeyondStream, BeyondStreams, CarriedLoss, ClassPassed, ReplicaStates};
+use rohrpost::{ModuleError, Name};
 use rohrpost_config::{Installation, Tcp};
 use rohrpost_mailbox::{Latency, Priority};
-use rohrpost_routers::replication::LineSettings;
+use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::replication::{LineSettings, ReplicaSettings};
 use rohrpost_routers::tcp::{Class, LineCounts, LineParts};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,6 +34,25 @@ pub(super) fn certificates(installation: &Installation, tcp: &Tcp) -> Option<Pat
 pub(super) fn line_parts(installation: &Installation, node: &str) -> Option<LineParts> {
     let settings = LineSettings::new(installation, node)?;
     Some(LineParts { settings, describe: Arc::new(Descriptions) })
+}
+
+/// What the TCP router sends to which node, as the file says.
+pub(super) fn streams(installation: &Installation, node: &str) -> BeyondStreams {
+    let Some(settings) = LineSettings::new(installation, node) else { return BeyondStreams::default() };
+    let beyond = |(index, client): &(NodeIndex, Name)| {
+        let name = installation.nodes.get(usize::from(*index)).map(|node| node.name.clone()).unwrap_or_default();
+        BeyondNode { name, client: client.raw() }
+    };
+    let places = |to: u64| (0..).zip(&settings.nodes).filter(move |(_, (index, _))| to & 1 << index != 0);
+    let stream = |(place, sent): (u16, &ReplicaSettings)| BeyondStream {
+        place,
+        source: sent.from.raw(),
+        item: sent.item.clone(),
+        record_bytes: sent.shape.record_bytes,
+        to: places(sent.to).map(|(place, _)| place).collect(),
+    };
+    let sent = (0..).zip(&settings.sent).filter(|(_, sent)| sent.to != 0);
+    BeyondStreams { nodes: settings.nodes.iter().map(beyond).collect(), streams: sent.map(stream).collect() }
 }
 
 /// What a module publishes of the replicas that go by the TCP router.

@@ -1,8 +1,10 @@
 //! The TCP router, as a module.
 
-use super::ends::{PERIOD, ReplicaReport, called, certificates, classes, configured, levels, line_parts, short};
+use super::ends::{PERIOD, ReplicaReport, called, certificates, classes, configured, levels, line_parts, short, streams};
 use crate::router::{NoSettings, faults::Encoded};
-use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, Tcp, TcpInterface};
+use rohrpost::interfaces::{
+    BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondStreams, Tcp, TcpInterface,
+};
 use rohrpost::{Context, Module, ModuleError, Name};
 use rohrpost_config::Node;
 use rohrpost_mailbox::{monotonic_ns, realtime_ns};
@@ -16,6 +18,7 @@ use std::sync::Arc;
 pub(super) struct ServerModule {
     shell: ServerShell,
     replicas: ReplicaReport,
+    streams: BeyondStreams,
     address: SocketAddr,
     began_ns: u64,
 }
@@ -60,7 +63,8 @@ impl Module for ServerModule {
         let shell = ServerShell::start(ServerParts { address, settings, faults, seal, names, node: &node, replicas })?;
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { shell, replicas: report, address, began_ns: monotonic_ns() })
+        let streams = streams(context.installation(), &own);
+        Ok(Self { shell, replicas: report, streams, address, began_ns: monotonic_ns() })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -68,6 +72,7 @@ impl Module for ServerModule {
         assert!(self.shell.is_well(), "the thread of the TCP router has ended");
         let seen = self.shell.members();
         context.publish_now(TcpInterface::HOSTS, &hosts(&seen.members))?;
+        context.publish_now(TcpInterface::STREAMS, &self.streams)?;
         context.publish_now(
             TcpInterface::CLIENTS,
             &BeyondClients {
@@ -133,7 +138,9 @@ fn client(member: MemberSnapshot) -> BeyondClient {
 mod tests {
     use super::*;
     use crate::tcp::ends::NAME_BYTES_MAX;
-    use rohrpost::interfaces::{CarriedLoss, ClassPassed};
+    use rohrpost_config::REPLICAS_MAX;
+    use rohrpost_network::NODES_MAX;
+    use rohrpost::interfaces::{BeyondNode, BeyondStream, CarriedLoss, ClassPassed};
     use rohrpost::wire::append;
     use rohrpost_routers::session::Cause;
     use rohrpost_routers::tcp::MEMBERS_MAX;
@@ -169,6 +176,18 @@ mod tests {
             held_lines: most,
             classes: vec![class; 64],
         };
+        let mut body = Vec::new();
+        append(&mut body, &all).unwrap();
+        assert!(body.len() < rohrpost_mailbox::BODY_BYTES_MAX, "{}", body.len());
+    }
+
+    #[test]
+    fn all_streams_to_all_nodes_fit_into_a_package() {
+        let node = BeyondNode { name: "x".repeat(250), client: u32::MAX };
+        let to: Vec<u16> = (0..NODES_MAX as u16).collect();
+        let stream =
+            BeyondStream { place: u16::MAX, source: u32::MAX, item: "x".repeat(250), record_bytes: u32::MAX, to };
+        let all = BeyondStreams { nodes: vec![node; NODES_MAX], streams: vec![stream; REPLICAS_MAX] };
         let mut body = Vec::new();
         append(&mut body, &all).unwrap();
         assert!(body.len() < rohrpost_mailbox::BODY_BYTES_MAX, "{}", body.len());

@@ -43,8 +43,13 @@ class Connection:
             self.write(frame(WELCOME, head + self._answer(asked, now_ns)))
         elif kind == REGISTER:
             number, *names = struct.unpack(f"<{len(rest) // 4}I", rest)
-            self.ranges = list(zip(names[::2], names[1::2]))
-            self.write(frame(REGISTERED, struct.pack("<IB3xII", number, 0, 0, 0)))
+            ranges = list(zip(names[::2], names[1::2]))
+            taken = self._router.taken(self, ranges)
+            if taken is None:
+                self.ranges = ranges
+                self.write(frame(REGISTERED, struct.pack("<IB3xII", number, 0, 0, 0)))
+            else:
+                self.write(frame(REGISTERED, struct.pack("<IB3xII", number, 1, *taken) + b"another"))
         elif kind == ASK:
             self.write(frame(ANSWER, self._answer(struct.unpack("<Q", rest)[0], now_ns)))
         elif kind == PACKAGE:
@@ -67,6 +72,18 @@ class Router:
         connection = Connection(self, write)
         self.connections.append(connection)
         return connection
+
+    def taken(self, by: Connection, ranges: list[tuple[int, int]]) -> tuple[int, int] | None:
+        """The first of these ranges of which another connection hosts a part."""
+        others = [range for other in self.connections if other is not by for range in other.ranges]
+        return next((its for its in ranges if any(its[0] <= last and first <= its[1] for first, last in others)), None)
+
+    def host_of(self, name: int) -> Connection | None:
+        """The connection that hosts a name."""
+        for connection in list(self.connections):
+            if any(first <= name <= last for first, last in connection.ranges):
+                return connection
+        return None
 
     def carry(self, rest: bytes) -> None:
         order = ">" if rest[8 + 15] & 1 else "<"

@@ -199,6 +199,40 @@ pub struct BeyondHosts {
     pub more: u64,
 }
 
+/// A node that has streams by the TCP router.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct BeyondNode {
+    /// The node.
+    pub name: String,
+    /// The name of its client: parts go to the host of that.
+    pub client: u32,
+}
+
+/// A stream that the TCP router sends.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct BeyondStream {
+    /// Its number in parts: the place of its `[[replica]]` in the file, from 0.
+    pub place: u16,
+    /// The module that writes it.
+    pub source: u32,
+    /// Its name in that module's interface.
+    pub item: String,
+    /// Bytes of a record at most.
+    #[schema(unit = "bytes")]
+    pub record_bytes: u32,
+    /// The nodes that have it, by their places in the list of these.
+    pub to: Vec<u16>,
+}
+
+/// All streams that the TCP router sends, as its file says.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct BeyondStreams {
+    /// The nodes beyond the LAN.
+    pub nodes: Vec<BeyondNode>,
+    /// In the order of their places.
+    pub streams: Vec<BeyondStream>,
+}
+
 /// Carries packages beyond the LAN; it does so also while it is off.
 #[interface(class = "tcp", crate = crate::macro_support)]
 pub trait Tcp {
@@ -217,4 +251,8 @@ pub trait Tcp {
     /// What this end carries of streams, where there are replicas by the TCP router.
     #[data(4)]
     fn replicas() -> ReplicaStates;
+
+    /// Which streams the TCP router sends to which node.
+    #[data(5)]
+    fn streams() -> BeyondStreams;
 }

@@ -9,15 +9,16 @@ from .errors import (
     RohrpostError, TooManyCalls,
 )  # fmt: skip
 from .faults import Fault
-from .interface import Module, command, data_out, on_data, parameter
+from .interface import Module, command, data_out, on_data, on_record, parameter
 from .names import BadName, Installation, Name
+from .picture import BadPicture
 from .schema import Variant
 from .types import Image, ImageFormat, LaserScan, Odometry, Pose, Twist
 
 __all__ = [
-    "BadArguments", "BadName", "BadReply", "CallError", "CallFault", "CallTimeout", "Char", "Choice", "F32", "F64",
-    "Fault", "FunctionError", "I8", "I16", "I32", "I64", "I128", "Image", "ImageFormat", "Installation", "LaserScan",
-    "Length", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry", "OutputLevel", "Pose",
+    "BadArguments", "BadName", "BadPicture", "BadReply", "CallError", "CallFault", "CallTimeout", "Char", "Choice",
+    "F32", "F64", "Fault", "FunctionError", "I8", "I16", "I32", "I64", "I128", "Image", "ImageFormat", "Installation",
+    "LaserScan", "Length", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry", "OutputLevel", "Pose",
     "RohrpostError", "State", "Status", "TooManyCalls", "Twist", "U8", "U16", "U32", "U64", "U128", "Variant",
-    "command", "data", "data_out", "on_data", "parameter", "said",
+    "command", "data", "data_out", "on_data", "on_record", "parameter", "said",
 ]  # fmt: skip

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from . import remote
+from . import prints, remote
 from .common import type_of_class
 from .errors import FunctionError, RohrpostError
 from .names import ALL_SYSTEMS, Installation, Name
@@ -16,6 +16,7 @@ from .remote.calling import NoSuchFunction, function_of
 from .schema import (
     Description, Field, Type, WalkError, describe_field, describe_result, parse_argument, show, to_json,
 )  # fmt: skip
+from .prints import Wrong
 from .schema.errors import plain
 from .schema.tree import is_word
 
@@ -24,13 +25,11 @@ _EPILOG = """examples:
   python -m rohrpost call motor.0 …            lists the functions and data of motor.0
   python -m rohrpost call motor.0.drive 0.3 0.5 …
   python -m rohrpost echo odometry.0.odometry --count 3 …
+  python -m rohrpost stream read odometry.0 odometry --next 3 …
+  python -m rohrpost picture camera.0 newest.png …
 Arguments are numbers, words, or JSON. `rohrpost check FILE` prints the digests; a program of a system that no file
 describes writes any number as the second. With --tls FOLDER NAME, FOLDER has ca.pem, NAME.pem and NAME.key.
 """
-
-
-class Wrong(Exception):
-    """What a person typed cannot be meant."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -77,6 +76,17 @@ def _parser() -> argparse.ArgumentParser:
     echo.add_argument("what", metavar="NAME.DATA", help="such as odometry.0.odometry")
     echo.add_argument("--rate", type=float, default=0.0, metavar="HZ", help="at most so many a second; 0: all")
     echo.add_argument("--count", type=int, default=0, metavar="N", help="end after so many")
+    stream = add("stream", prints.read_stream, "prints records of a stream that the robot's file sends here")
+    stream.add_argument("action", choices=["read"], help="print the newest record, or the next ones")
+    stream.add_argument("what", metavar="NAME", help="module, such as odometry.0")
+    stream.add_argument("item", metavar="ITEM", help="stream, such as odometry")
+    stream.add_argument("--next", type=int, default=0, metavar="N", help="so many, one after the other")
+    stream.add_argument("--raw", metavar="FILE", help="write the bytes of records into this file")
+    stream.add_argument("--bytes", type=int, default=64, metavar="N", help="bytes in JSON of a field of bytes; 0: all")
+    picture = add("picture", prints.save_picture, "writes the newest picture of a camera into a file")
+    picture.add_argument("what", metavar="NAME", help="module, such as camera.0")
+    picture.add_argument("file", metavar="FILE", help="such as newest.png; of a camera that makes JPEG, newest.jpg")
+    picture.add_argument("--item", default="image", metavar="ITEM", help="its stream (default: image)")
     return parser
 
 

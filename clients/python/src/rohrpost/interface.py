@@ -20,6 +20,8 @@ from .wire import COMMAND_MAX, DATA_MAX, FIRST_OWN
 
 F = TypeVar("F", bound=Callable[..., Any])
 _MARK = "__rohrpost__"
+RECORD_BYTES_MAX = 64 << 20
+"""Larger records are not taken, unless a program says so."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,15 @@ class OnData:
     data: str
     period_s: float
     newest: bool
+
+
+@dataclass(frozen=True)
+class OnRecord:
+    """What :func:`on_record` says."""
+
+    publisher: str
+    stream: str
+    most_bytes: int
 
 
 def command(number: int, *, idempotent: bool = False, error: Any = None) -> Callable[[F], F]:
@@ -80,7 +91,14 @@ def on_data(publisher: str, data: str, *, period_s: float = 0.0, newest: bool = 
     return _marked(OnData(publisher, data, period_s, newest))
 
 
-def _marked(mark: Command | DataOut | OnData) -> Callable[[F], F]:
+def on_record(publisher: str, stream: str, *, most_bytes: int = RECORD_BYTES_MAX) -> Callable[[F], F]:
+    """A function that is run with the records of another module's stream, such as ``"camera.0", "image"``: with the
+    newest, whenever its turn comes. Records of more than ``most_bytes`` are not taken. If the function's argument has an
+    annotation, the records must be of that type."""
+    return _marked(OnRecord(publisher, stream, most_bytes))
+
+
+def _marked(mark: Command | DataOut | OnData | OnRecord) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         setattr(function, _MARK, mark)
         return function
@@ -176,6 +194,7 @@ class Interface:
     commands: dict[int, Handler] = field(default_factory=dict)
     outputs: dict[int, Handler] = field(default_factory=dict)
     inputs: list[Handler] = field(default_factory=list)
+    records: list[Handler] = field(default_factory=list)
     parameters: list[Parameter] = field(default_factory=list)
 
 
@@ -243,6 +262,7 @@ def _interface(cls: type, klass: str, name: str) -> Interface:
     made.commands = {mark.number: Handler(key, mark) for key, mark in commands}
     made.outputs = {mark.number: Handler(key, mark) for key, mark in outputs}
     made.inputs = [Handler(key, mark, _input(cls, key)) for key, mark in marked if isinstance(mark, OnData)]
+    made.records = [Handler(key, mark, _input(cls, key)) for key, mark in marked if isinstance(mark, OnRecord)]
     hints = hints_of(cls) if any(isinstance(it, Parameter) for it in vars(cls).values()) else {}
     for base in reversed(cls.__mro__):
         for value in vars(base).values():

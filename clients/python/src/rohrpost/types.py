@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated
 
+from . import picture
 from .annotations import F32, U32, data, said
 
 
@@ -70,3 +73,20 @@ class Image:
     row_bytes: Annotated[U32, said(unit="B")]
     format: ImageFormat
     pixels: bytes
+
+    def check(self) -> None:
+        """Whether its sizes fit together; what a file holds is not looked at. Raises :class:`rohrpost.BadPicture`."""
+        picture.check(self)
+
+    def rows(self) -> Iterator[memoryview]:
+        """The pixels of each row, from top to bottom, without the gaps. Raises :class:`rohrpost.BadPicture`."""
+        return picture.rows(self)
+
+    def to_png(self) -> bytes:
+        """A PNG file of it: brightness and distance as grey, of 8 or 16 bits, distance in mm (0: not known; 65535:
+        that far, or further). What is a PNG file stays as it is. Raises :class:`rohrpost.BadPicture`."""
+        return picture.to_png(self)
+
+    def save_png(self, path: str | Path) -> None:
+        """Writes :meth:`to_png` into a file."""
+        Path(path).write_bytes(self.to_png())

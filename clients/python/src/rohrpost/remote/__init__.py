@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import re
 import ssl
 import time
 
@@ -18,14 +19,16 @@ from ..names import Installation, Name
 from .calling import NoSuchFunction
 from .client import Client
 from .following import Data, NoSuchData
-from .handles import Proxy, Subscription
+from .handles import Proxy, RecordStream, Subscription
+from .records import BadRecord, Missed, Record
 from .session import Settings
+from .streams import NoSuchStream
 from .timing import SystemTime
 from .transport import Tls
 
 __all__ = [
-    "Client", "Data", "Installation", "Name", "NoSuchData", "NoSuchFunction", "Proxy", "Subscription", "SystemTime",
-    "Tls", "connect",
+    "BadRecord", "Client", "Data", "Installation", "Missed", "Name", "NoSuchData", "NoSuchFunction", "NoSuchStream",
+    "Proxy", "Record", "RecordStream", "Subscription", "SystemTime", "Tls", "connect",
 ]  # fmt: skip
 
 
@@ -37,7 +40,9 @@ def prepare(
         raise ValueError("a label has at most 64 bytes, without control characters")
     if not 1 <= installation.system <= 254:
         raise ValueError(f"system {installation.system}: a system is 1 to 254")
-    settings = Settings(installation, label, time.time_ns(), quota_bytes, big_endian)
+    said = re.fullmatch(r"(.+)\.system-\d+", tls.own) if tls else re.fullmatch(r"node (\S+) of .+", label)
+    node = said[1] if said else ""
+    settings = Settings(installation, label, time.time_ns(), quota_bytes, big_endian, node)
     return installation.name(own), settings, None if tls is None else tls.context()
 
 

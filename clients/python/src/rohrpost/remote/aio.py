@@ -21,16 +21,17 @@ from typing import Any
 from .. import wire
 from ..common import Status
 from ..errors import CallError, Misuse, NoConnection
-from ..interface import Module
+from ..interface import RECORD_BYTES_MAX, Module
 from ..names import Installation, Name
 from ..schema.description import Description
 from ..schema.tree import UNIT
 from . import calling, prepare
-from .aio_handles import AsyncProxy, AsyncSubscription, ModuleHost
+from .aio_handles import AsyncProxy, AsyncRecordStream, AsyncSubscription, ModuleHost
 from .calls import Call
 from .clock import passed_ns
 from .core import Core, Endpoint, not_connected
 from .session import Settings, Step
+from .streams import Wanted
 from .timing import SystemTime
 from .transport import Plain, Sealed, Tls, Transport
 
@@ -237,6 +238,26 @@ class AsyncClient:
         )  # fmt: skip
         self._soon()
         return subscription
+
+    def stream(
+        self,
+        name: str | Name,
+        stream: str,
+        *,
+        room: int = 1,
+        expected: Any = None,
+        most_bytes: int = RECORD_BYTES_MAX,
+    ) -> AsyncRecordStream:
+        """Reads a stream of a module; see :meth:`rohrpost.remote.Client.stream`."""
+        self._check()
+        reading = AsyncRecordStream(self, room)
+        type = calling.expected_type(expected)
+        wanted = Wanted(self.name(name), stream, type, most_bytes, reading._take, reading._said)
+        self._core.streams.add(wanted)
+        reading._wanted = wanted
+        reading._takes_from(wanted.assembly)
+        self._soon()
+        return reading
 
     def host(self, name: str | Name, module: Module) -> None:
         """Hosts a module under this name until the client is closed. Its functions run in the loop, one after the

@@ -15,6 +15,8 @@ from ..schema.tree import Type
 from .clock import passed_ns
 from .core import Endpoint
 from .following import Data, Following
+from .records import Record, RecordQueue
+from .streams import NoSuchStream, Wanted
 
 if TYPE_CHECKING:
     from .aio import AsyncClient
@@ -95,6 +97,62 @@ class AsyncSubscription:
             self._is_closed = True
             self._client._core.now_ns = passed_ns()
             self._client._core.unfollow(self._client._core.own, self._following)
+            self._client._soon()
+
+
+class AsyncRecordStream(RecordQueue):
+    """A stream of a module, record by record: ``async for record in stream``, :meth:`next` or :meth:`newest`, as
+    :class:`rohrpost.remote.RecordStream` has them. Ended by ``close``, or at the end of ``async with``."""
+
+    _wanted: Wanted
+
+    def __init__(self, client: AsyncClient, room: int) -> None:
+        super().__init__(room)
+        self._client = client
+        self._is_closed = False
+
+    async def next(self, timeout_s: float | None = None) -> Record:
+        """The next record that was not taken yet."""
+        return await self._wait(self._next, timeout_s)
+
+    async def newest(self, timeout_s: float | None = None) -> Record:
+        """The newest record that came."""
+        return await self._wait(self._take_newest, timeout_s)
+
+    async def _wait(self, take: Callable[[], Record | None], timeout_s: float | None) -> Record:
+        self._client._check()
+        found: Record | None = None
+
+        def is_over() -> bool:
+            nonlocal found
+            found = take()
+            return found is not None or self._is_closed or isinstance(self.problem, NoSuchStream)
+
+        try:
+            await asyncio.wait_for(self._client._until(is_over), timeout_s)
+        except asyncio.TimeoutError:
+            raise self.problem or TimeoutError(f"no record came within {timeout_s} s") from None
+        if found is not None:
+            return found
+        if self._is_closed or self._client._is_closed or self.problem is None:
+            raise Misuse("this stream is closed")
+        raise self.problem
+
+    async def __aiter__(self) -> AsyncIterator[Record]:
+        while not self._is_closed:
+            yield await self.next()
+
+    async def __aenter__(self) -> AsyncRecordStream:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends it."""
+        if not self._is_closed and not self._client._is_closed:
+            self._is_closed = True
+            self._client._core.streams.remove(passed_ns(), self._wanted)
             self._client._soon()
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from ..common import Status
 from ..errors import CallError, Misuse, NoConnection
-from ..interface import Module
+from ..interface import RECORD_BYTES_MAX, Module
 from ..names import Name
 from ..schema.description import Description
 from ..schema.tree import UNIT
@@ -27,8 +27,9 @@ from . import calling
 from .calls import Call
 from .clock import passed_ns
 from .core import Core, Endpoint, not_connected
-from .handles import ModuleHost, Proxy, Subscription
+from .handles import ModuleHost, Proxy, RecordStream, Subscription
 from .session import Settings, Step
+from .streams import Wanted
 from .timing import SystemTime
 from .transport import Plain, Sealed, Transport
 
@@ -232,6 +233,31 @@ class Client:
             )  # fmt: skip
         self._wake()
         return subscription
+
+    def stream(
+        self,
+        name: str | Name,
+        stream: str,
+        *,
+        room: int = 1,
+        expected: Any = None,
+        most_bytes: int = RECORD_BYTES_MAX,
+    ) -> RecordStream:
+        """Reads a stream of a module, over outages and restarts, if the robot's file has a ``[[replica]]`` of it for the
+        node that this program is on.
+
+        ``room``: records that wait here; the oldest gives way. ``expected``: the type that they must have, such as
+        ``rohrpost.Image``. Records of more than ``most_bytes`` are not taken.
+        """
+        reading = RecordStream(self, room)
+        type = calling.expected_type(expected)
+        wanted = Wanted(self.name(name), stream, type, most_bytes, reading._take, reading._said)
+        with self._locked():
+            self._core.streams.add(wanted)
+        reading._wanted = wanted
+        reading._takes_from(wanted.assembly)
+        self._wake()
+        return reading
 
     # Modules.
 

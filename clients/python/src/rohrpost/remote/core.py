@@ -13,7 +13,7 @@ from typing import Any
 from .. import faults
 from ..errors import CallError, Misuse, NoConnection, NotSent, RohrpostError
 from ..faults import Fault
-from ..interface import Module
+from ..interface import Handler, Module
 from ..names import COMMANDS, DATA, REPLIES, Name
 from ..schema.description import Description
 from ..schema.tree import Type
@@ -21,7 +21,9 @@ from ..wire import ERROR, UNKNOWN_NS, CallEnvelope, Package, ReplyEnvelope, Wire
 from .calls import Caller, incarnation
 from .following import Data, Describing, Following
 from .hosted import Hosted
+from .recorded import RecordWork
 from .session import Session, Settings, Step
+from .streams import Streams, Wanted
 from .timing import SystemTime
 from .work import WorkQueue
 
@@ -36,6 +38,8 @@ class Endpoint:
         self.caller = caller
         self.follows: dict[int, Following] = {}
         self.hosted: Hosted | None = None
+        self.reads: list[Wanted] = []
+        """Streams that its module follows."""
         self._next_id = 0
 
     def free_id(self) -> int:
@@ -63,7 +67,8 @@ class Core:
         self.words = "not connected yet"
         """What people are to know of the connection."""
         self.was_up = False
-        self.session = Session(settings, [], now_ns, self._deliver, self._told)
+        self.streams = Streams(settings.installation, settings.node, lambda: self.now_ns, self._register)
+        self.session = Session(settings, [], now_ns, self._deliver, self._told, self.streams)
         self.own = self.add(now_ns, own)
 
     # Names.
@@ -95,6 +100,12 @@ class Core:
         """Subscribes to all that a hosted module follows."""
         hosted = endpoint.hosted
         assert hosted is not None
+        for handler in hosted.interface.records:
+            try:
+                self._read_input(endpoint, hosted, handler, problem)
+            except Misuse:
+                self.remove(self.now_ns, endpoint)
+                raise
         for handler in hosted.interface.inputs:
             mark = handler.mark
             to = self.settings.installation.name(mark.publisher)
@@ -104,8 +115,20 @@ class Core:
 
             self.follow(endpoint, to, mark.data, handler.type, int(mark.period_s * 1e6), mark.newest, take, problem)
 
+    def _read_input(
+        self, endpoint: Endpoint, hosted: Hosted, handler: Handler, problem: Callable[[RohrpostError | None], None]
+    ) -> None:
+        mark, waiting = handler.mark, RecordWork(hosted, handler)
+        to = self.settings.installation.name(mark.publisher)
+        wanted = Wanted(to, mark.stream, handler.type, mark.most_bytes, waiting.take, problem)
+        self.streams.add(wanted)
+        endpoint.reads.append(wanted)
+
     def remove(self, now_ns: int, endpoint: Endpoint) -> None:
         """A module is hosted no more."""
+        for wanted in endpoint.reads:
+            self.streams.remove(now_ns, wanted)
+        endpoint.reads.clear()
         for following in list(endpoint.follows.values()):
             self.unfollow(endpoint, following)
         endpoint.hosted = None
@@ -114,7 +137,8 @@ class Core:
             self._register(now_ns)
 
     def _register(self, now_ns: int) -> None:
-        self.session.host(now_ns, [(name.raw, name.raw | 0xFF) for name in sorted(self._endpoints)])
+        own = [(name.raw, name.raw | 0xFF) for name in sorted(self._endpoints)]
+        self.session.host(now_ns, own + self.streams.ranges())
 
     # The stream.
 
@@ -128,6 +152,8 @@ class Core:
                 due.extend(following.poll(now_ns) for following in list(endpoint.follows.values()))
             if endpoint.hosted is not None:
                 due.append(endpoint.hosted.poll(now_ns))
+        if self.session.is_up:
+            due.append(self.streams.poll(now_ns, self.own.caller))
         step, until_ns = self.session.poll(now_ns)
         if step is Step.WAIT:
             until_ns = min([until_ns, *(it for it in due if it is not None)])

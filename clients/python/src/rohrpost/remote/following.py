@@ -42,6 +42,21 @@ class NoSuchData(RohrpostError):
     """The module has no such data, or of another type."""
 
 
+def item_of(to: Name, described: Description, name: str, expected: Type | None, what: str) -> DataItem:
+    """Data, or a stream (``what``), of this name and type. Raises :class:`NoSuchData`."""
+    having = [it for it in described.data if what == "data" or it.is_stream]
+    item = next((it for it in having if it.name == name), None)
+    if item is None:
+        names = ", ".join(it.name for it in having) or "none"
+        raise NoSuchData(f"{to}: no {what} `{name}`; it has: {names}")
+    if expected and type_to_bytes(expected, True) != type_to_bytes(item.field.type, True):
+        raise NoSuchData(
+            f"{to}: {what} `{name}` are {describe_type(item.field.type)}, and not {describe_type(expected)} as here; "
+            "names of types and units count, too"
+        )
+    return item
+
+
 class Describing:
     """Asks a module what it offers, part by part; ``done`` gets it, or what went wrong. ``now`` tells the time, ns."""
 
@@ -131,17 +146,10 @@ class Following:
     def _described(self, described: Description | CallError) -> None:
         if isinstance(described, CallError):
             return self._failed(described)
-        item = described.data_item(self._data)
-        if item is None:
-            names = ", ".join(it.name for it in described.data) or "none"
-            return self._failed(NoSuchData(f"{self.to}: no data `{self._data}`; it has: {names}"))
-        if self._expected and type_to_bytes(self._expected, True) != type_to_bytes(item.field.type, True):
-            return self._failed(
-                NoSuchData(
-                    f"{self.to}: data `{self._data}` are {describe_type(item.field.type)}, and not "
-                    f"{describe_type(self._expected)} as here; names of types and units count, too"
-                )
-            )
+        try:
+            item = item_of(self.to, described, self._data, self._expected, "data")
+        except NoSuchData as error:
+            return self._failed(error)
         self._description, self._item = described, item
         self._subscribe(described)
 

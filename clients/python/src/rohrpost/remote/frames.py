@@ -7,6 +7,7 @@ came.
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Union
 
@@ -14,7 +15,7 @@ from ..errors import NoConnection
 from ..schema.errors import plain
 from ..wire import BODY_BYTES_MAX, HEAD_BYTES, Head, Package
 
-HELLO, WELCOME, REFUSAL, REGISTER, REGISTERED, PACKAGE, ASK, ANSWER = range(1, 9)
+HELLO, WELCOME, REFUSAL, REGISTER, REGISTERED, PACKAGE, ASK, ANSWER, RECORD_PART, DESCRIPTION = range(1, 11)
 """Kinds of frames."""
 MAGIC = b"RpTc"
 VERSION = 1
@@ -22,6 +23,10 @@ LENGTH_MAX = 8 + HEAD_BYTES + BODY_BYTES_MAX
 NAME_BYTES_MAX = 64
 RANGES_MAX = 2048
 HOPS_MAX = 8
+PART_BYTES = 4096
+"""All parts of a record but the last have so many."""
+DESCRIPTION_BYTES_MAX = 64 << 10
+"""Longest description that is carried with records."""
 
 
 class BadFrame(NoConnection):
@@ -107,7 +112,41 @@ class Carried:
     package: Package
 
 
-Message = Union[Welcome, Refused, Registered, Carried, Answer]
+@dataclass(frozen=True)
+class RecordPart:
+    """A part of a record of a stream. ``place``: which replica; ``generation``: how often the server has seen the
+    stream made anew; ``description``: check of that by which it is read; times in ns, ``written`` 0: nobody knows."""
+
+    place: int
+    generation: int
+    description: int
+    incarnation: int
+    length: int
+    offset: int
+    sequence: int
+    epoch: int
+    stamp: int
+    written: int
+    error: int
+    step: int
+    sampled: int
+    body: bytes
+
+
+@dataclass(frozen=True)
+class DescribedPart:
+    """A part of the description of the module that writes a stream. ``written``: records that it ever wrote."""
+
+    place: int
+    generation: int
+    check: int
+    length: int
+    offset: int
+    written: int
+    body: bytes
+
+
+Message = Union[Welcome, Refused, Registered, Carried, Answer, RecordPart, DescribedPart]
 
 
 def _frame(kind: int, rest: bytes, hops: int = 0) -> bytes:
@@ -157,7 +196,7 @@ class Splitter:
         length, kind, hops, zero = struct.unpack("<IBBH", kept[:8])
         if 20 <= kept[0] <= 23 and kept[1] == 3 and 1 <= kept[2] <= 4:
             raise BadFrame("it speaks TLS; write the same `security` in [tcp] at both ends")
-        if kind not in (WELCOME, REFUSAL, REGISTERED, PACKAGE, ANSWER):
+        if kind not in _PARSE:
             raise BadFrame("no session of Rohrpost; is this the port of its TCP router?")
         if zero or (hops and kind != PACKAGE):
             raise BadFrame("damaged: a head with bits that mean nothing")
@@ -233,7 +272,26 @@ def _answer(rest: bytes, _: int) -> Answer:
     return answer
 
 
-_PARSE = {WELCOME: _welcome, REFUSAL: _refusal, REGISTERED: _registered, PACKAGE: _package, ANSWER: _answer}
+def _record_part(rest: bytes, _: int) -> RecordPart:
+    part = RecordPart(*_RECORD_HEAD.unpack(rest[: _RECORD_HEAD.size]), rest[_RECORD_HEAD.size :])
+    if (part.length and not part.body) or part.offset + len(part.body) > part.length:
+        raise BadFrame("damaged: a part lies outside its record")
+    return part
+
+
+def _described_part(rest: bytes, _: int) -> DescribedPart:
+    part = DescribedPart(*_DESCRIBED_HEAD.unpack(rest[: _DESCRIBED_HEAD.size]), rest[_DESCRIBED_HEAD.size :])
+    if not part.body or part.length > DESCRIPTION_BYTES_MAX or part.offset + len(part.body) > part.length:
+        raise BadFrame("damaged: a part lies outside its description")
+    return part
+
+
+_RECORD_HEAD = struct.Struct("<HH4I4Q3I")
+_DESCRIBED_HEAD = struct.Struct("<HH3IQ")
+_PARSE: dict[int, Callable[[bytes, int], Message]] = {
+    WELCOME: _welcome, REFUSAL: _refusal, REGISTERED: _registered, PACKAGE: _package, ANSWER: _answer,
+    RECORD_PART: _record_part, DESCRIPTION: _described_part,
+}  # fmt: skip
 OBJECTIONS = {
     1: "another client hosts this range, or what it lies in",
     2: "another client hosts a part of this range, or it crosses another range of this client",

@@ -15,6 +15,8 @@ from ..schema.tree import Type
 from .clock import passed_ns
 from .core import Endpoint
 from .following import Data, Following
+from .records import Record, RecordQueue
+from .streams import NoSuchStream, Wanted
 
 if TYPE_CHECKING:
     from .client import Client
@@ -96,6 +98,64 @@ class Subscription:
             self._is_closed = True
             self._client._core.now_ns = passed_ns()
             self._client._core.unfollow(self._client._core.own, self._following)
+            self._client._lock.notify_all()
+        self._client._wake()
+
+
+class RecordStream(RecordQueue):
+    """A stream of a module, record by record: ``for record in stream``, :meth:`next` or :meth:`newest`. Ended by
+    ``close`` or ``with``."""
+
+    _wanted: Wanted
+
+    def __init__(self, client: Client, room: int) -> None:
+        super().__init__(room)
+        self._client = client
+        self._is_closed = False
+
+    def next(self, timeout_s: float | None = None) -> Record:
+        """The next record that was not taken yet. Raises what is in the way, or :class:`TimeoutError`, if none comes in
+        time."""
+        return self._wait(self._next, timeout_s)
+
+    def newest(self, timeout_s: float | None = None) -> Record:
+        """The newest record that came, again if no newer one came since; the first one is waited for. :meth:`next` goes
+        on behind it. Raises as :meth:`next` does."""
+        return self._wait(self._take_newest, timeout_s)
+
+    def _wait(self, take: Callable[[], Record | None], timeout_s: float | None) -> Record:
+        client, found = self._client, None
+
+        def is_over() -> bool:
+            nonlocal found
+            found = take()
+            return found is not None or self._is_closed or client._is_closed or isinstance(self.problem, NoSuchStream)
+
+        with client._locked():
+            client._lock.wait_for(is_over, timeout_s)
+        if found is not None:
+            return found
+        if self._is_closed or client._is_closed:
+            raise Misuse("this stream is closed")
+        raise self.problem or TimeoutError(f"no record came within {timeout_s} s")
+
+    def __iter__(self) -> Iterator[Record]:
+        while not self._is_closed:
+            yield self.next()
+
+    def __enter__(self) -> RecordStream:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends it."""
+        if self._is_closed or self._client._is_closed or self._client._pid != os.getpid():
+            return
+        with self._client._lock:
+            self._is_closed = True
+            self._client._core.streams.remove(passed_ns(), self._wanted)
             self._client._lock.notify_all()
         self._client._wake()
 

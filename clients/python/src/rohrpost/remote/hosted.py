@@ -242,7 +242,7 @@ class Hosted:
             if isinstance(error, FunctionError) and has_own_error:
                 result = encode(type, tree.Variant("Err", error.value))
             elif error is not None:
-                return self._fault(now_ns, command, self._failed(error))
+                return self._fault(now_ns, command, self.failed(error))
             else:
                 result = encode(type, tree.Variant("Ok", value) if has_own_error else value)
         except WalkError as wrong:
@@ -250,7 +250,7 @@ class Hosted:
             return self._fault(now_ns, command, Fault(faults.MODULE_ERROR, (text,)))
         self._done(now_ns, command, False, result)
 
-    def _failed(self, error: BaseException) -> Fault:
+    def failed(self, error: BaseException) -> Fault:
         """The module's own code has failed: it takes no commands until it is switched off and on."""
         text = plain(f"{type(error).__name__}: {error}")[:900]
         self.state, self.error = State.Error, text
@@ -271,7 +271,7 @@ class Hosted:
                 if command is not None:
                     self._done(now_ns, command, False, b"")
                 return
-            fault = self._failed(error)
+            fault = self.failed(error)
             if command is not None:
                 self._fault(now_ns, command, fault)
 
@@ -280,7 +280,7 @@ class Hosted:
     def _set_parameters(self, wish: Any, command: _Command) -> None:
         def finish(now_ns: int, value: Any, error: BaseException | None) -> None:
             if error is not None:
-                return self._fault(now_ns, command, self._failed(error))
+                return self._fault(now_ns, command, self.failed(error))
             self._done(now_ns, command, False, value)
 
         self.work.add(Work(lambda: self._parameters.set(wish), finish))
@@ -346,7 +346,7 @@ class Hosted:
 
     def _noticed(self, error: BaseException | None) -> None:
         if error is not None:
-            self._failed(error)
+            self.failed(error)
 
     def poll(self, now_ns: int) -> int | None:
         """Adds what is due to its work; when to look again, ns."""

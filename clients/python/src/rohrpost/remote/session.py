@@ -15,12 +15,13 @@ import enum
 import heapq
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from ..errors import NotSent
 from ..names import Installation
 from ..wire import BIG_ENDIAN, NEWEST, Package
 from . import frames
-from .frames import BadFrame, Carried, Refused, Registered, Splitter, Welcome
+from .frames import BadFrame, Carried, DescribedPart, RecordPart, Refused, Registered, Splitter, Welcome
 from .timing import (
     FRAME_MAX_NS, HANDSHAKE_MAX_NS, SECOND, STALLED_AFTER_NS, Asking, Backoff, ServerClock,
 )  # fmt: skip
@@ -57,13 +58,15 @@ class State(enum.Enum):
 @dataclass(frozen=True)
 class Settings:
     """What a session knows before its first connection. ``incarnation``: not 0; ``quota_bytes``: of what waits;
-    ``big_endian``: the byte order of the heads that it writes."""
+    ``big_endian``: the byte order of the heads that it writes; ``node``: of the robot's file, that this program is on,
+    if it says so."""
 
     installation: Installation
     label: str
     incarnation: int
     quota_bytes: int = 1 << 20
     big_endian: bool = False
+    node: str = ""
 
 
 class _Waiting:
@@ -112,11 +115,21 @@ class _Waiting:
         return bool(self._heap)
 
 
+class SessionStreams(Protocol):
+    """What a session has to do with streams."""
+
+    def received(self, now_ns: int, connection: tuple[int, int], part: RecordPart | DescribedPart) -> None:
+        """A part came, by this incarnation of the server, in this connection."""
+
+    def objected(self, now_ns: int, registered: Registered, words: str) -> bool:
+        """The server does not let this client host a name; whether it is one for streams, and others are registered."""
+
+
 class Session:
     """Keeps up a connection to the server, registers what it hosts, and carries packages both ways.
 
     ``deliver`` gets each package that came; ``told`` gets words for people, once for each change, and whether packages
-    may leave now.
+    may leave now; ``streams`` gets parts of records.
     """
 
     def __init__(
@@ -126,11 +139,13 @@ class Session:
         now_ns: int,
         deliver: Callable[[int, Package], None],
         told: Callable[[bool, str], None],
+        streams: SessionStreams | None = None,
     ) -> None:
         self._settings = settings
         self._ranges = ranges
         self._deliver = deliver
         self._told = told
+        self._streams = streams
         self._said = ""
         self._state = State.AWAY
         self._until_ns = now_ns
@@ -298,6 +313,9 @@ class Session:
             self._registered(now_ns, message)
         elif isinstance(message, Carried):
             self._take(now_ns, message)
+        elif isinstance(message, (RecordPart, DescribedPart)):
+            if self._streams is not None:
+                self._streams.received(now_ns, (self._server, self._attempt), message)
         else:
             self.clock.heard(now_ns, message)
 
@@ -318,9 +336,12 @@ class Session:
             self._holds = True
             self._say(True, "takes part")
             return
-        self._register_ns = now_ns + _REGISTER_AGAIN_NS
         host = f": {registered.text}" if registered.text else ""
-        self._say(False, f"{frames.OBJECTIONS[registered.objection]}{host}")
+        words = f"{frames.OBJECTIONS[registered.objection]}{host}"
+        if self._streams is not None and self._streams.objected(now_ns, registered, words):
+            return
+        self._register_ns = now_ns + _REGISTER_AGAIN_NS
+        self._say(False, words)
 
     def _take(self, now_ns: int, carried: Carried) -> None:
         session = self.clock.session(now_ns)

@@ -7,6 +7,7 @@ import enum
 import json
 import math
 import struct
+from collections.abc import Callable
 from decimal import Decimal
 from typing import Any
 
@@ -170,54 +171,57 @@ def rust_float(number: float) -> str:
     return f"{'-' if sign else ''}{mantissa[0]}{point}e{power}"
 
 
-def to_json(type: Type, value: Any) -> Any:
-    """A value of this type in the form that JSON has of it, as ``rohrpost call --json`` prints it."""
+def to_json(type: Type, value: Any, of_bytes: Callable[[bytes], Any] = list) -> Any:
+    """A value of this type in the form that JSON has of it, as ``rohrpost call --json`` prints it. ``of_bytes``: what
+    becomes of bytes; else they are a list of numbers."""
     type = unwrapped(type)
     if value is None:
         return None
     if isinstance(type, Plain):
-        return _plain_to_json(type, value)
+        return _plain_to_json(type, value, of_bytes)
     if isinstance(type, Option):
         if is_nullable(type.inner):
-            some = to_json(type.inner, value.value)
+            some = to_json(type.inner, value.value, of_bytes)
             return "Some" if some is None else {"Some": some}
-        return to_json(type.inner, value)
+        return to_json(type.inner, value, of_bytes)
     if isinstance(type, (List, Array)):
-        return list(value) if is_byte(type.element) else [to_json(type.element, element) for element in value]
+        if is_byte(type.element):
+            return of_bytes(bytes(value))
+        return [to_json(type.element, element, of_bytes) for element in value]
     if isinstance(type, Tuple):
-        return [to_json(inner, element) for inner, element in zip(type.elements, value)]
+        return [to_json(inner, element, of_bytes) for inner, element in zip(type.elements, value)]
     if isinstance(type, Map):
         if not type.has_words:
-            return [[to_json(type.key, key), to_json(type.value, inner)] for key, inner in value]
-        return {_key(type.key, key): to_json(type.value, inner) for key, inner in value.items()}
+            return [[to_json(type.key, key, of_bytes), to_json(type.value, inner, of_bytes)] for key, inner in value]
+        return {_key(type.key, key): to_json(type.value, inner, of_bytes) for key, inner in value.items()}
     if isinstance(type, Struct):
-        return _members_to_json(type.named, value)
+        return _members_to_json(type.named, value, of_bytes)
     variant = type.by_name[value.name]
-    payload = None if isinstance(value, enum.Enum) else _members_to_json(variant, value.value)
+    payload = None if isinstance(value, enum.Enum) else _members_to_json(variant, value.value, of_bytes)
     return variant.name if payload is None else {variant.name: payload}
 
 
-def _plain_to_json(type: Plain, value: Any) -> Any:
+def _plain_to_json(type: Plain, value: Any, of_bytes: Callable[[bytes], Any]) -> Any:
     if type in (F32, F64):
         number = shortest(value) if type == F32 else value
         return number if math.isfinite(number) else rust_float(number)
     if type == BYTES:
-        return list(value)
+        return of_bytes(value)
     if type.integer and not -(1 << 63) <= value < 1 << 64:
         return str(value)
     return value
 
 
-def _members_to_json(named: Named, value: Any) -> Any:
+def _members_to_json(named: Named, value: Any, of_bytes: Callable[[bytes], Any]) -> Any:
     if named.kind == 0:
         return None
     if named.kind == 1:
-        return to_json(named.fields[0].type, value)
+        return to_json(named.fields[0].type, value, of_bytes)
     if named.kind == 2:
-        return [to_json(field.type, element) for field, element in zip(named.fields, value)]
+        return [to_json(field.type, element, of_bytes) for field, element in zip(named.fields, value)]
     if dataclasses.is_dataclass(value):
-        return {field.name: to_json(field.type, getattr(value, field.name)) for field in named.fields}
-    return {field.name: to_json(field.type, value[field.name]) for field in named.fields}
+        return {field.name: to_json(field.type, getattr(value, field.name), of_bytes) for field in named.fields}
+    return {field.name: to_json(field.type, value[field.name], of_bytes) for field in named.fields}
 
 
 def _key(type: Type, key: Any) -> str:
