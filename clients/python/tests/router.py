@@ -66,6 +66,8 @@ class Router:
         self.now_ns = now_ns
         self.incarnation = 1
         self.connections: list[Connection] = []
+        self.is_strict = False
+        """Whether a name has one host."""
         self.sees: Callable[[bytes], int] = lambda package: 1
 
     def connect(self, write: Callable[[bytes], None]) -> Connection:
@@ -75,6 +77,8 @@ class Router:
 
     def taken(self, by: Connection, ranges: list[tuple[int, int]]) -> tuple[int, int] | None:
         """The first of these ranges of which another connection hosts a part."""
+        if not self.is_strict:
+            return None
         others = [range for other in self.connections if other is not by for range in other.ranges]
         return next((its for its in ranges if any(its[0] <= last and first <= its[1] for first, last in others)), None)
 

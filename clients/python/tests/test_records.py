@@ -16,6 +16,7 @@ from rohrpost.schema import DataItem, Description, Field
 from rohrpost.schema.tree import BYTES, U32
 
 from . import parts
+from .router import frame
 
 CASES = pathlib.Path(__file__).parents[3] / "tests/conformance/records.json"
 SECOND = 1_000_000_000
@@ -39,8 +40,8 @@ class Line:
         self.problem = problem
 
     def feed(self, *frames: bytes, server: int = 1) -> None:
-        for frame in frames:
-            self.splitter.take(frame, self.now_ns)
+        for its in frames:
+            self.splitter.take(its, self.now_ns)
             while (message := self.splitter.next(self.now_ns)) is not None:
                 assert isinstance(message, (RecordPart, DescribedPart))
                 if message.place != self.place:
@@ -85,17 +86,17 @@ class Records(unittest.TestCase):
         self.assertEqual([it.data for it in line.records], [body])
 
     def test_a_part_that_is_none_ends_the_session(self) -> None:
-        for frame in [
+        for its in [
             parts.part(b"1234", 1, CHECK, offset=4096, length=4099),
             parts.part(b"1234", 1, CHECK, length=3),
             parts.part(b"", 1, CHECK, length=3),
             parts.part(b"1234", 1, CHECK, offset=0xFFFFFFFF, length=0xFFFFFFFF),
-            parts.frame(parts.RECORD_PART, bytes(63)),
-            parts.frame(parts.DESCRIPTION, bytes(24)),
-            parts.frame(parts.DESCRIPTION, bytes(8) + b"\x01\x00\x01\x00" + bytes(13)),
+            frame(parts.RECORD_PART, bytes(63)),
+            frame(parts.DESCRIPTION, bytes(24)),
+            frame(parts.DESCRIPTION, bytes(8) + b"\x01\x00\x01\x00" + bytes(13)),
         ]:
             with self.assertRaises(BadFrame):
-                described().feed(frame)
+                described().feed(its)
 
     def test_memory_grows_with_what_came_and_not_with_what_is_announced(self) -> None:
         line = described(record_bytes=0xFFFFFFFF)
@@ -115,9 +116,14 @@ class Records(unittest.TestCase):
 
     def test_descriptions_are_bounded_and_read_once_a_second(self) -> None:
         line = described()
-        read = []
+        read: list[int] = []
         understand = line.assembly._understand
-        line.assembly._understand = lambda *its: (read.append(1), understand(*its))[1]  # type: ignore[method-assign]
+
+        def count(words: bytes, check: int) -> None:
+            read.append(1)
+            understand(words, check)
+
+        line.assembly._understand = count  # type: ignore[method-assign]
         for number in range(50):
             other = Description("Camera", "camera", (), (DataItem(number, Field("image", U32), True),)).to_bytes()
             line.feed(*parts.described(other))
@@ -140,9 +146,9 @@ class Records(unittest.TestCase):
         self.assertEqual(str(line.problem), "1.112.0.0: no stream `picture`; it has: image")
         said: list[rp.RohrpostError | None] = []
         other = Assembly(PUBLISHER, "image", U32, 100, lambda record: None, said.append)
-        for frame in parts.described(DESCRIPTION):
+        for its in parts.described(DESCRIPTION):
             splitter = Splitter()
-            splitter.take(frame, 0)
+            splitter.take(its, 0)
             message = splitter.next(0)
             assert isinstance(message, DescribedPart)
             other.described(0, 1, message)

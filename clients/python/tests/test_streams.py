@@ -65,12 +65,13 @@ class Looker(rp.Module, klass="probe"):
 class Streams(unittest.TestCase):
     def setUp(self) -> None:
         self.server = Server()
+        self.server.router.is_strict = True
         self.addCleanup(self.server.close)
         self.host = self.connected("tcp.255", label="the router")
         self.host.host("tcp.255", TcpRouter())
 
-    def connected(self, own: str, **how: Any) -> remote.Client:
-        client = remote.connect(self.server.address, own, ROBOT, **({"timeout_s": 20, "label": LABEL} | how))
+    def connected(self, own: str, label: str = LABEL) -> remote.Client:
+        client = remote.connect(self.server.address, own, ROBOT, timeout_s=20, label=label)
         self.addCleanup(client.close)
         return client
 
@@ -140,7 +141,7 @@ class Streams(unittest.TestCase):
             client.stream("camera.0", "other").newest()
         self.assertEqual(
             str(missing.exception),
-            'the robot sends node laptop no stream camera.0/other; its file needs a [[replica]] with `stream = '
+            "the robot sends node laptop no stream camera.0/other; its file needs a [[replica]] with `stream = "
             '"camera.0/other"` and "laptop" in `to`. What it sends: camera.0/image, camera.0/count',
         )  # fmt: skip
         elsewhere = self.connected("tool.2", label="node brain of robot")

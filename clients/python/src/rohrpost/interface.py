@@ -93,8 +93,8 @@ def on_data(publisher: str, data: str, *, period_s: float = 0.0, newest: bool = 
 
 def on_record(publisher: str, stream: str, *, most_bytes: int = RECORD_BYTES_MAX) -> Callable[[F], F]:
     """A function that is run with the records of another module's stream, such as ``"camera.0", "image"``: with the
-    newest, whenever its turn comes. Records of more than ``most_bytes`` are not taken. If the function's argument has an
-    annotation, the records must be of that type."""
+    newest, whenever its turn comes. Records of more than ``most_bytes`` are not taken. If the function's argument has
+    an annotation, the records must be of that type."""
     return _marked(OnRecord(publisher, stream, most_bytes))
 
 

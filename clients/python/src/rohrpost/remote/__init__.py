@@ -61,7 +61,8 @@ def connect(
 
     The class of the name is the priority of all that is sent. ``label`` is for people. Waits ``timeout_s`` seconds
     until it takes part, and raises :class:`rohrpost.NoConnection`, if it does not; with 0 it does not wait, and goes on
-    trying by itself. ``big_endian``: the byte order of its heads; ``quota_bytes``: of packages that wait for the stream.
+    trying by itself. ``big_endian``: the byte order of its heads; ``quota_bytes``: of packages that wait for the
+    stream.
     """
     name, settings, context = prepare(own, installation, tls, label, big_endian, quota_bytes)
     client = Client(server, name, settings, context)

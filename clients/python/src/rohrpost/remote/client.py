@@ -243,8 +243,8 @@ class Client:
         expected: Any = None,
         most_bytes: int = RECORD_BYTES_MAX,
     ) -> RecordStream:
-        """Reads a stream of a module, over outages and restarts, if the robot's file has a ``[[replica]]`` of it for the
-        node that this program is on.
+        """Reads a stream of a module, over outages and restarts, if the robot's file has a ``[[replica]]`` of it for
+        the node that this program is on.
 
         ``room``: records that wait here; the oldest gives way. ``expected``: the type that they must have, such as
         ``rohrpost.Image``. Records of more than ``most_bytes`` are not taken.

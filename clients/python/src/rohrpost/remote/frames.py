@@ -117,6 +117,7 @@ class RecordPart:
     """A part of a record of a stream. ``place``: which replica; ``generation``: how often the server has seen the
     stream made anew; ``description``: check of that by which it is read; times in ns, ``written`` 0: nobody knows."""
 
+    body: bytes
     place: int
     generation: int
     description: int
@@ -130,20 +131,19 @@ class RecordPart:
     error: int
     step: int
     sampled: int
-    body: bytes
 
 
 @dataclass(frozen=True)
 class DescribedPart:
     """A part of the description of the module that writes a stream. ``written``: records that it ever wrote."""
 
+    body: bytes
     place: int
     generation: int
     check: int
     length: int
     offset: int
     written: int
-    body: bytes
 
 
 Message = Union[Welcome, Refused, Registered, Carried, Answer, RecordPart, DescribedPart]
@@ -273,14 +273,14 @@ def _answer(rest: bytes, _: int) -> Answer:
 
 
 def _record_part(rest: bytes, _: int) -> RecordPart:
-    part = RecordPart(*_RECORD_HEAD.unpack(rest[: _RECORD_HEAD.size]), rest[_RECORD_HEAD.size :])
+    part = RecordPart(rest[_RECORD_HEAD.size :], *_RECORD_HEAD.unpack(rest[: _RECORD_HEAD.size]))
     if (part.length and not part.body) or part.offset + len(part.body) > part.length:
         raise BadFrame("damaged: a part lies outside its record")
     return part
 
 
 def _described_part(rest: bytes, _: int) -> DescribedPart:
-    part = DescribedPart(*_DESCRIBED_HEAD.unpack(rest[: _DESCRIBED_HEAD.size]), rest[_DESCRIBED_HEAD.size :])
+    part = DescribedPart(rest[_DESCRIBED_HEAD.size :], *_DESCRIBED_HEAD.unpack(rest[: _DESCRIBED_HEAD.size]))
     if not part.body or part.length > DESCRIPTION_BYTES_MAX or part.offset + len(part.body) > part.length:
         raise BadFrame("damaged: a part lies outside its description")
     return part

@@ -117,8 +117,8 @@ class Assembly:
         self.record_bytes = record_bytes
         self.lost, self.sampled = 0, 0
         self.refused: Counter[str] = Counter()
-        """Parts that were not taken, by cause: ``duplicate``, ``late``, ``undescribed``, ``too-large``, ``unsound``; and
-        records of which the rest never came: ``incomplete``."""
+        """Parts that were not taken, by cause: ``duplicate``, ``late``, ``undescribed``, ``too-large``, ``unsound``;
+        and records of which the rest never came: ``incomplete``."""
         self._publisher, self._stream, self._expected = publisher, stream, expected
         self._take, self._say = take, say
         self._type: Type | None = None
@@ -281,8 +281,8 @@ class RecordQueue:
 
     @property
     def refused(self) -> dict[str, int]:
-        """Parts that were not taken, by cause, as ``rohrpost net`` counts them, and records of which the rest never came
-        (``incomplete``)."""
+        """Parts that were not taken, by cause, as ``rohrpost net`` counts them, and records of which the rest never
+        came (``incomplete``)."""
         return {} if self._assembly is None else dict(+self._assembly.refused)
 
     @property

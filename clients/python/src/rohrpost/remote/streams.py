@@ -172,8 +172,8 @@ class Streams:
         given = ", ".join(f"{self._installation.text(Name(it.source))}/{it.item}" for it in having) or "none"
         wanted.say(
             NoSuchStream(
-                f'the robot sends node {self._node} no stream {name}; its file needs a [[replica]] with `stream = "{name}"` '
-                f'and "{self._node}" in `to`. What it sends: {given}'
+                f"the robot sends node {self._node} no stream {name}; its file needs a [[replica]] with "
+                f'`stream = "{name}"` and "{self._node}" in `to`. What it sends: {given}'
             )
         )
 
