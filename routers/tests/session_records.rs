@@ -300,6 +300,13 @@ fn cases() -> Vec<Case> {
     case.record(7, 10);
     case.record(9, 10);
     all.push(case);
+
+    let mut case = Case::described("of a later server a stream may begin anew");
+    case.record(7, 10);
+    case.server = 2;
+    case.record(0, 10);
+    case.record(1, 10);
+    all.push(case);
     all
 }
 

@@ -10,6 +10,7 @@ use rohrpost::{Name, ToolLink};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Node, NodeError, ParticipantInfo, local, node_directory};
 use rohrpost_modules::runtime::ClientError;
+use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use rohrpost_testbed::report::skipped;
 use std::fmt::Debug;
 use std::io::ErrorKind;
@@ -69,6 +70,20 @@ pub(crate) fn lacks_namespaces(said: &str) -> bool {
         skipped(said);
     }
     lacks
+}
+
+/// A network of nodes with these addresses. None, with a report of what is skipped, where namespaces are not permitted.
+#[track_caller]
+pub(crate) fn lab<'a>(nodes: impl IntoIterator<Item = (&'a str, &'a str)>, what: &str) -> Option<Lab> {
+    let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
+    match Lab::new(&nodes.into_iter().map(spec).collect::<Vec<_>>(), 1500) {
+        Ok(lab) => Some(lab),
+        Err(LabError::NotAllowed(error)) => {
+            skipped(&format!("{what} (network namespaces: {error})"));
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
 }
 
 /// A table's line in a configuration: a probe with these settings and other keys.

@@ -4,14 +4,13 @@
 //! Both are programs in Python that know the pages of the book alone (`python/node.py`, `python/teammate.py`). For the
 //! whole minute: `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost-cli --test e2e hostile`.
 
-use crate::harness::{PATIENCE, Place, Robot};
+use crate::harness::{PATIENCE, Place, Robot, lab};
 use crate::process::{Running, Said};
 use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{LaserInterface, WheelsInterface};
 use rohrpost::types::Odometry;
 use rohrpost::wire::{append, from_bytes};
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_testbed::report::skipped;
+use rohrpost_routers::lab::Lab;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -38,15 +37,7 @@ struct Field {
 
 impl Field {
     fn launched() -> Option<Self> {
-        let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
-        let lab = match Lab::new(&NODES.map(spec), 1500) {
-            Ok(lab) => lab,
-            Err(LabError::NotAllowed(error)) => {
-                skipped(&format!("hostile programs beside the demo (network namespaces: {error})"));
-                return None;
-            }
-            Err(error) => panic!("{error}"),
-        };
+        let lab = lab(NODES, "hostile programs beside the demo")?;
         let place = Place::new();
         let mut field = Self { nodes: Vec::new(), place, lab };
         std::fs::write(field.config(), robot()).unwrap();

@@ -3,11 +3,12 @@
 //! launched there.
 
 use crate::conforming;
-use crate::harness::{Place, Robot, signal, wait};
+use crate::harness::{Place, Robot, lab, signal, wait};
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_testbed::report::skipped;
+use rohrpost_routers::lab::Lab;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -37,15 +38,7 @@ impl Scene {
 
     /// The same with more modules.
     fn with(security: &str, modules: &str) -> Option<Self> {
-        let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
-        let lab = match Lab::new(&NODES.map(spec), 1500) {
-            Ok(lab) => lab,
-            Err(LabError::NotAllowed(error)) => {
-                skipped(&format!("Python on a laptop (network namespaces: {error})"));
-                return None;
-            }
-            Err(error) => panic!("{error}"),
-        };
+        let lab = lab(NODES, "Python on a laptop")?;
         let place = Place::new();
         let config = place.path("robot.toml");
         std::fs::write(&config, configured(security) + modules).unwrap();
@@ -98,13 +91,25 @@ impl Scene {
 
     /// `python -m rohrpost` on the laptop, unsealed.
     fn prints(&self, words: &[&str]) -> Said {
+        self.printing(words).said()
+    }
+
+    fn printing(&self, words: &[&str]) -> Running {
         let (digests, label) = (self.digests(), "node laptop of robot");
-        let classes = ["motor=200", "odometry=160", "tcp=64", "tool=16"];
+        let classes = ["motor=200", "odometry=160", "camera=112", "tcp=64", "tool=16"];
         let mut arguments = [&["-m", "rohrpost"], words].concat();
         arguments.extend(["--server", SERVER, "--digests", &digests, "--as", "tool.70", "--timeout", "20"]);
         arguments.extend(["--label", label]);
         arguments.extend(classes.iter().flat_map(|class| ["--class", class]));
-        self.python(&arguments).said()
+        self.python(&arguments)
+    }
+
+    /// The newest picture of the camera, which takes no more of them: its number, and postcard.
+    fn newest_picture(&self) -> (String, Vec<u8>) {
+        let (config, raw) = (self.place.path("robot.toml"), self.place.path("newest.postcard"));
+        let at = ["--config", config.to_str().unwrap(), "--node", "base", "--raw", raw.to_str().unwrap()];
+        let said = self.place.say(&[&["stream", "read", "camera.0", "image"][..], &at].concat()).ok();
+        (said.split_whitespace().next().unwrap().into(), std::fs::read(raw).unwrap())
     }
 
     fn stop(mut self) {
@@ -118,12 +123,16 @@ fn configured(security: &str) -> String {
     let map = repository().join("config/building.map");
     format!(
         "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nmotor = {{ id = 200 }}\n\
-         odometry = {{ id = 160 }}\nlaser = {{ id = 150 }}\ngripper = {{ id = 110 }}\nprobe = {{ id = 96 }}\n\
+         odometry = {{ id = 160 }}\nlaser = {{ id = 150 }}\ncamera = {{ id = 112 }}\ngripper = {{ id = 110 }}\n\
+         probe = {{ id = 96 }}\n\
          tcp = {{ id = 64 }}\noutput = {{ id = 32 }}\ntool = {{ id = 16 }}\n[scheduling]\nreal-time-from = 256\n\
          [nodes.base]\ntools = [0, 15]\n[nodes.laptop]\nnetwork = \"tcp\"\ntools = [64, 127]\n\
          [tcp]\n{security}\naddress = \"{}\"\nserver = \"base\"\n\
-         [[module]]\nname = \"motor.0\"\nnode = \"base\"\naliases = [\"odometry.0\", \"laser.0\"]\nbuiltin = \"sim\"\n\
-         settings = {{ map = {map:?}, seed = 1, laser-rate-hz = 10, odometry-rate-hz = 20 }}\n\
+         [[module]]\nname = \"motor.0\"\nnode = \"base\"\naliases = [\"odometry.0\", \"laser.0\", \"camera.0\"]\n\
+         builtin = \"sim\"\n\
+         settings = {{ map = {map:?}, seed = 1, laser-rate-hz = 10, odometry-rate-hz = 20, camera-rate-hz = 2 }}\n\
+         [module.stream.image]\nrecord = \"1 MiB\"\nkeep = 4\n\
+         [[replica]]\nstream = \"camera.0/image\"\nto = [\"laptop\"]\n\
          [[module]]\nname = \"gripper.0\"\nnode = \"laptop\"\nprogram = \"gripper.py\"\n\
          calls = [\"motor.0\", \"odometry.0\"]\n",
         NODES[0].1
@@ -144,6 +153,7 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
     );
     let watched = scene.book("watch.py").said().ok();
     assert_eq!(watched, "motor.0 is On, odometry.0 is On\nnumber 0\n");
+    a_picture_comes_as_the_camera_took_it(&scene, || scene.book("look.py"), "picture.png");
     let closes = || scene.says(&["call", "gripper.0", "close", "4"]);
     assert_eq!(closes().ok(), "{width_m: 0.02, force_n: 4}\n");
     let refused = scene.says(&["call", "gripper.0", "close", "40"]);
@@ -177,6 +187,28 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
     scene.stop();
 }
 
+/// A program on the laptop writes the newest picture: its pixels are those of the camera.
+fn a_picture_comes_as_the_camera_took_it(scene: &Scene, program: impl FnOnce() -> Running, file: &str) {
+    scene.says(&["call", "motor.0", "off"]).ok();
+    let (number, taken) = scene.newest_picture();
+    let said = program().said().ok();
+    assert!(said.contains(&number) && said.contains("640"), "{number}: {said}");
+    let (size, pixels) = read_png(&scene.place.path(file));
+    assert_eq!((size, pixels.len()), ((640, 480), 640 * 480 * 3));
+    // Before the pixels stand sizes and format alone.
+    assert!(taken.ends_with(&pixels) && taken.len() < pixels.len() + 16, "not as the camera took it");
+    scene.says(&["call", "motor.0", "on"]).ok();
+}
+
+/// Width, height and bytes of a file of red, green and blue.
+fn read_png(file: &Path) -> ((u32, u32), Vec<u8>) {
+    let mut reader = png::Decoder::new(BufReader::new(File::open(file).unwrap())).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    assert_eq!((info.color_type, info.bit_depth), (png::ColorType::Rgb, png::BitDepth::Eight));
+    ((info.width, info.height), pixels)
+}
+
 #[test]
 fn what_the_tools_print_python_prints_on_the_laptop() {
     let Some(scene) = Scene::launched(OPEN) else { return };
@@ -205,6 +237,16 @@ fn what_the_tools_print_python_prints_on_the_laptop() {
     assert_eq!(numbers.collect::<Vec<_>>(), [Some(0), Some(1)], "{data:?}");
     let time = scene.prints(&["time"]).ok();
     assert!(time.contains(" s since 1970, off by at most "), "{time}");
+    let picture = || scene.printing(&["picture", "camera.0", "it.png"]);
+    a_picture_comes_as_the_camera_took_it(&scene, picture, "it.png");
+    let records = scene.prints(&["stream", "read", "camera.0", "image", "--next", "2", "--json", "--bytes", "3"]).ok();
+    let records: Vec<serde_json::Value> = records.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let values: Vec<_> = records.iter().map(|record| &record["value"]).filter(|value| !value.is_null()).collect();
+    assert_eq!(values.len(), 2, "{records:?}");
+    let pixels = &values[0]["pixels"];
+    assert_eq!((values[0]["width_px"].as_u64(), pixels["len_bytes"].as_u64()), (Some(640), Some(640 * 480 * 3)));
+    let none = scene.prints(&["stream", "read", "odometry.0", "odometry"]);
+    assert!(none.code == Some(2) && none.err.contains("sends node laptop no stream odometry.0/odometry"), "{none:?}");
     scene.stop();
 }
 

@@ -3,11 +3,10 @@
 //!
 //! How many come is for the line to say; what is compared is poses with pictures.
 
-use crate::harness::{Place, Robot, wait};
+use crate::harness::{Place, Robot, lab, wait};
 use crate::process::Running;
 use crate::replicas_lossy::{Follower, Right, is_picture, is_pose};
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_testbed::report::skipped;
+use rohrpost_routers::lab::Lab;
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -71,15 +70,7 @@ struct Laptop {
 impl Laptop {
     /// None, with a report, where namespaces are not permitted.
     fn launched() -> Option<Self> {
-        let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
-        let lab = match Lab::new(&NODES.map(spec), 1500) {
-            Ok(lab) => lab,
-            Err(LabError::NotAllowed(error)) => {
-                skipped(&format!("replicas on a laptop (network namespaces: {error})"));
-                return None;
-            }
-            Err(error) => panic!("{error}"),
-        };
+        let lab = lab(NODES, "replicas on a laptop")?;
         let place = Place::new();
         let config = place.path("robot.toml");
         let program = format!("{:?}", std::env::current_exe().unwrap());

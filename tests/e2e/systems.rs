@@ -1,13 +1,12 @@
 //! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south`
 //! (system 2) reaches it. Where system 1 has a LAN, `arm` is on it; else `arm` may be a system of its own.
 
-use crate::harness::{NETWORK, Place, Robot, probe, wait};
+use crate::harness::{NETWORK, Place, Robot, lab, probe, wait};
 use crate::probe::ProbingInterface;
 use crate::process::{Running, Said};
 use rohrpost::CallError;
 use rohrpost::wire::{append, from_bytes};
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_testbed::report::skipped;
+use rohrpost_routers::lab::Lab;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -41,15 +40,7 @@ pub(crate) struct Systems {
 impl Systems {
     /// Without any launch. None, with a report, where namespaces are not permitted.
     pub(crate) fn new(security: &str) -> Option<Self> {
-        let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
-        let lab = match Lab::new(&NODES.map(spec), 1500) {
-            Ok(lab) => lab,
-            Err(LabError::NotAllowed(error)) => {
-                skipped(&format!("systems that meet (network namespaces: {error})"));
-                return None;
-            }
-            Err(error) => panic!("{error}"),
-        };
+        let lab = lab(NODES, "systems that meet")?;
         let place = Place::new();
         for (system, id) in SYSTEMS.into_iter().zip(1..) {
             std::fs::write(place.path(&format!("{system}.toml")), configured(system, id, security)).unwrap();

@@ -1,12 +1,11 @@
 //! A robot's laptop, `far`, by a bad Wi-Fi: the robot publishes more than the link carries, and the laptop follows in a
 //! mailbox that keeps the newest only.
 
-use crate::harness::{PATIENCE, Place, Robot, probe, wait};
+use crate::harness::{PATIENCE, Place, Robot, lab, probe, wait};
 use crate::probe::{COUNT, ProbingInterface};
 use crate::process::Running;
 use rohrpost::wire::{append, from_bytes};
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_testbed::report::skipped;
+use rohrpost_routers::lab::Lab;
 use std::collections::HashSet;
 use std::path::PathBuf;
 
@@ -55,15 +54,7 @@ struct Wifi {
 impl Wifi {
     /// None, with a report, where namespaces are not permitted.
     fn launched() -> Option<Self> {
-        let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
-        let lab = match Lab::new(&NODES.map(spec), 1500) {
-            Ok(lab) => lab,
-            Err(LabError::NotAllowed(error)) => {
-                skipped(&format!("a laptop by a bad Wi-Fi (network namespaces: {error})"));
-                return None;
-            }
-            Err(error) => panic!("{error}"),
-        };
+        let lab = lab(NODES, "a laptop by a bad Wi-Fi")?;
         let place = Place::new();
         let config = place.path("robot.toml");
         let modules = [

@@ -21,7 +21,8 @@ from .router import frame
 CASES = pathlib.Path(__file__).parents[3] / "tests/conformance/records.json"
 SECOND = 1_000_000_000
 PUBLISHER = Name.of(1, 112, 0)
-DESCRIPTION = Description("Camera", "camera", (), (DataItem(2, Field("image", BYTES), True),)).to_bytes()
+DATA = DataItem(2, Field("image", BYTES), True), DataItem(3, Field("rate", U32))
+DESCRIPTION = Description("Camera", "camera", (), DATA).to_bytes()
 CHECK = zlib.crc32(DESCRIPTION)
 
 
@@ -84,6 +85,13 @@ class Records(unittest.TestCase):
         for byte in b"".join(parts.record(body, 5, CHECK)):
             line.feed(bytes([byte]))
         self.assertEqual([it.data for it in line.records], [body])
+
+    def test_parts_that_come_twice_or_out_of_order_change_nothing(self) -> None:
+        line, body = described(), bytes(range(256)) * 40
+        first, second, third = parts.record(body, 5, CHECK)
+        line.feed(second, first, first, third, second, second, third)
+        self.assertEqual([it.data for it in line.records], [body])
+        self.assertEqual(line.told(), ({"late": 1, "duplicate": 2, "unsound": 1}, 0, 0))
 
     def test_a_part_that_is_none_ends_the_session(self) -> None:
         for its in [
@@ -167,14 +175,11 @@ class Records(unittest.TestCase):
         for its in line.records:
             queue._take(its)
         queue._takes_from(line.assembly)
-        first = queue._next()
-        assert first is not None
-        self.assertEqual((first.sequence, queue.missed), (4, remote.Missed(0, 0, 3)))
+        self.assertEqual((queue._taken(False).sequence, queue.missed), (4, remote.Missed(0, 0, 3)))
         for its in line.records[:2]:
             queue._take(its)
-        newest = queue._take_newest()
-        assert newest is not None
-        self.assertEqual((newest.sequence, queue._next(), queue.missed.all), (2, None, 5))
+        self.assertEqual((queue._taken(True).sequence, queue._has(False), queue.missed.all), (2, False, 5))
+        self.assertEqual((queue._has(True), queue._taken(True).sequence), (True, 2))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ mod sealed;
 mod strangers;
 mod twice;
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, lab, probe, wait};
 use crate::process::Running;
 use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
@@ -25,8 +25,7 @@ use rohrpost::schema::Data;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Fault, Name};
 use rohrpost_config::Installation;
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_testbed::report::skipped;
+use rohrpost_routers::lab::Lab;
 use rohrpost_testbed::stalls::Stalls;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -35,7 +34,6 @@ use std::time::{Duration, Instant};
 /// Nodes, their addresses, and the instances of their tools.
 const NODES: [(&str, &str, &str); 3] =
     [("base", "10.78.0.1", "[0, 15]"), ("arm", "10.78.0.2", "[16, 31]"), ("desk", "10.78.0.3", "[32, 47]")];
-const MTU: u16 = 1500;
 /// Older packages are not run; seed 002 has this under "at most once".
 const TRANSIT_MAX: Duration = Duration::from_secs(2);
 /// "At once", in time in which the computer runs; a call that is not answered takes [`PATIENCE`].
@@ -61,19 +59,7 @@ impl Field {
     /// are not permitted.
     fn new(nodes: usize, network: &str) -> Option<Self> {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        let spec = |(name, address, _): &(&str, &str, &str)| NodeSpec {
-            name: (*name).into(),
-            address: address.parse().unwrap(),
-        };
-        let specs: Vec<NodeSpec> = NODES[..nodes].iter().map(spec).collect();
-        let lab = match Lab::new(&specs, MTU) {
-            Ok(lab) => lab,
-            Err(LabError::NotAllowed(error)) => {
-                skipped(&format!("faults of networks (network namespaces: {error})"));
-                return None;
-            }
-            Err(error) => panic!("{error}"),
-        };
+        let lab = lab(NODES[..nodes].iter().map(|(name, address, _)| (*name, *address)), "faults of networks")?;
         let place = Place::new();
         let config = configure(&place, "test", nodes, network, &[&format!("{OUTPUT}node = \"base\"\n"), LOG]);
         Some(Self { nodes: Vec::new(), place, lab, config, stalls: Stalls::watch(), _turn: turn })

@@ -113,27 +113,24 @@ class AsyncRecordStream(RecordQueue):
 
     async def next(self, timeout_s: float | None = None) -> Record:
         """The next record that was not taken yet."""
-        return await self._wait(self._next, timeout_s)
+        return await self._wait(False, timeout_s)
 
     async def newest(self, timeout_s: float | None = None) -> Record:
         """The newest record that came."""
-        return await self._wait(self._take_newest, timeout_s)
+        return await self._wait(True, timeout_s)
 
-    async def _wait(self, take: Callable[[], Record | None], timeout_s: float | None) -> Record:
+    async def _wait(self, newest: bool, timeout_s: float | None) -> Record:
         self._client._check()
-        found: Record | None = None
 
         def is_over() -> bool:
-            nonlocal found
-            found = take()
-            return found is not None or self._is_closed or isinstance(self.problem, NoSuchStream)
+            return self._has(newest) or self._is_closed or isinstance(self.problem, NoSuchStream)
 
         try:
             await asyncio.wait_for(self._client._until(is_over), timeout_s)
         except asyncio.TimeoutError:
             raise self.problem or TimeoutError(f"no record came within {timeout_s} s") from None
-        if found is not None:
-            return found
+        if self._has(newest):
+            return self._taken(newest)
         if self._is_closed or self._client._is_closed or self.problem is None:
             raise Misuse("this stream is closed")
         raise self.problem

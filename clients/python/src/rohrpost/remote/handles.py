@@ -116,28 +116,27 @@ class RecordStream(RecordQueue):
     def next(self, timeout_s: float | None = None) -> Record:
         """The next record that was not taken yet. Raises what is in the way, or :class:`TimeoutError`, if none comes in
         time."""
-        return self._wait(self._next, timeout_s)
+        return self._wait(False, timeout_s)
 
     def newest(self, timeout_s: float | None = None) -> Record:
         """The newest record that came, again if no newer one came since; the first one is waited for. :meth:`next` goes
         on behind it. Raises as :meth:`next` does."""
-        return self._wait(self._take_newest, timeout_s)
+        return self._wait(True, timeout_s)
 
-    def _wait(self, take: Callable[[], Record | None], timeout_s: float | None) -> Record:
-        client, found = self._client, None
+    def _wait(self, newest: bool, timeout_s: float | None) -> Record:
+        client = self._client
 
         def is_over() -> bool:
-            nonlocal found
-            found = take()
-            return found is not None or self._is_closed or client._is_closed or isinstance(self.problem, NoSuchStream)
+            is_closed = self._is_closed or client._is_closed
+            return self._has(newest) or is_closed or isinstance(self.problem, NoSuchStream)
 
         with client._locked():
             client._lock.wait_for(is_over, timeout_s)
-        if found is not None:
-            return found
-        if self._is_closed or client._is_closed:
-            raise Misuse("this stream is closed")
-        raise self.problem or TimeoutError(f"no record came within {timeout_s} s")
+            if self._has(newest):
+                return self._taken(newest)
+            if self._is_closed or client._is_closed:
+                raise Misuse("this stream is closed")
+            raise self.problem or TimeoutError(f"no record came within {timeout_s} s")
 
     def __iter__(self) -> Iterator[Record]:
         while not self._is_closed:

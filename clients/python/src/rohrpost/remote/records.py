@@ -264,10 +264,14 @@ class RecordQueue:
     def _said(self, problem: RohrpostError | None) -> None:
         self.problem = problem
 
-    def _next(self) -> Record | None:
-        return self._waiting.popleft() if self._waiting else None
+    def _has(self, newest: bool) -> bool:
+        return self._newest is not None if newest else bool(self._waiting)
 
-    def _take_newest(self) -> Record | None:
+    def _taken(self, newest: bool) -> Record:
+        """The newest, or the next one; there is one."""
+        if not newest:
+            return self._waiting.popleft()
+        assert self._newest is not None
         self._passed_over += max(0, len(self._waiting) - 1)
         self._waiting.clear()
         return self._newest
