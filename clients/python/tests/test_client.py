@@ -319,6 +319,15 @@ class Clients(unittest.TestCase):
 
         asyncio.run(main())
 
+    def test_both_clients_have_the_same_methods_and_each_has_a_text(self) -> None:
+        def public(cls: type) -> dict[str, Any]:
+            return {name: getattr(cls, name) for name in dir(cls) if not name.startswith("_")}
+
+        both = public(remote.Client), public(aio.AsyncClient)
+        self.assertEqual(both[0].keys(), both[1].keys())
+        for name in both[0]:
+            self.assertTrue(all(cls[name].__doc__ for cls in both), name)
+
     def test_an_interpreter_ends_with_a_client_open(self) -> None:
         code = (
             "from rohrpost import remote\n"

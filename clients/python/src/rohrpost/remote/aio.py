@@ -14,7 +14,6 @@ import asyncio
 import os
 import socket
 import ssl
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -28,9 +27,11 @@ from ..schema.tree import UNIT
 from . import calling, prepare
 from .aio_handles import AsyncProxy, AsyncRecordStream, AsyncSubscription, ModuleHost
 from .calls import Call
+from .client import Client
 from .clock import passed_ns
-from .core import Core, Endpoint, not_connected
+from .core import Endpoint, not_connected
 from .session import Settings, Step
+from .shell import Shell, documented_like
 from .streams import Wanted
 from .timing import SystemTime
 from .transport import Plain, Sealed, Tls, Transport
@@ -59,21 +60,18 @@ async def connect(
     return client
 
 
-class AsyncClient:
+@documented_like(Client)
+class AsyncClient(Shell):
     """Takes part at a TCP router; :func:`connect` makes one. Closed at the end of ``async with``."""
 
     def __init__(self, server: str, own: Name, settings: Settings, context: ssl.SSLContext | None) -> None:
-        self._server = calling.server_of(server)
-        self._context = context
-        self._pid = os.getpid()
+        super().__init__(server, own, settings, context)
         self._loop = asyncio.get_running_loop()
-        self._core = Core(settings, own, passed_ns, time.time_ns)
         self._changed = asyncio.Event()
         self._line: _Line | None = None
         self._connecting: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._hosts: list[ModuleHost] = []
-        self._is_closed = False
         self._turn()
 
     # Its life.
@@ -85,7 +83,6 @@ class AsyncClient:
         self.close()
 
     def close(self) -> None:
-        """Ends it: what it hosts is gone, calls under way end with :class:`rohrpost.NotSent`."""
         if self._pid != os.getpid() or self._is_closed:
             return
         self._is_closed = True
@@ -101,7 +98,6 @@ class AsyncClient:
         self._changed.set()
 
     async def wait_until_up(self, timeout_s: float) -> None:
-        """Waits until it takes part. Raises :class:`rohrpost.NoConnection` with what is in the way."""
         self._check()
         try:
             await asyncio.wait_for(self._until(lambda: self._core.session.is_up), timeout_s)
@@ -112,21 +108,8 @@ class AsyncClient:
         while not is_so() and not self._is_closed:
             await self._changed.wait()
 
-    @property
-    def is_up(self) -> bool:
-        """Whether packages leave now."""
-        return self._core.session.is_up
-
-    @property
-    def words(self) -> str:
-        """How the connection stands, for people."""
-        return self._core.words
-
     def _check(self) -> None:
-        if self._pid != os.getpid():
-            raise Misuse("this client was opened before a fork, and its connection is the parent's; open one here")
-        if self._is_closed:
-            raise Misuse("this client is closed")
+        super()._check()
         try:
             is_here = asyncio.get_running_loop() is self._loop
         except RuntimeError:
@@ -136,12 +119,7 @@ class AsyncClient:
 
     # Calls.
 
-    def name(self, text: str | Name) -> Name:
-        """The module that a text names, such as ``motor.0``."""
-        return self._core.settings.installation.name(text)
-
     async def describe(self, name: str | Name, timeout_s: float = 1.0) -> Description:
-        """What a module offers."""
         return await self._describe(self._core.own, self.name(name), timeout_s)
 
     async def _describe(self, endpoint: Endpoint, to: Name, timeout_s: float) -> Description:
@@ -158,7 +136,6 @@ class AsyncClient:
     async def command(
         self, name: str | Name, number: int, interface: int, arguments: bytes, timeout_s: float = 1.0
     ) -> bytes:
-        """Calls a function by its number, with the hash of its interface; arguments and result are postcard."""
         prepared = calling.Prepared(number, interface, arguments, UNIT)
         return (await self._sent(self._core.own, self.name(name), prepared, timeout_s)).outcome()
 
@@ -182,7 +159,6 @@ class AsyncClient:
         return call
 
     async def call(self, name: str | Name, function: str, *values: Any, timeout_s: float = 1.0, **named: Any) -> Any:
-        """Calls a function of a module by its description. Raises :class:`rohrpost.CallError`."""
         return await self._call_by_name(self._core.own, self.name(name), function, values, named, timeout_s)
 
     async def _call_by_name(
@@ -193,28 +169,23 @@ class AsyncClient:
         return await self._call(endpoint, to, calling.prepare(description, found, values, named), timeout_s)
 
     def proxy(self, name: str | Name, timeout_s: float = 1.0) -> AsyncProxy:
-        """The functions of a module: ``await client.proxy("motor.0").drive(0.3, 0.0)``. ``timeout_s``: of each call."""
         return AsyncProxy(self, self._core.own, self.name(name), timeout_s)
 
     async def status(self, name: str | Name, timeout_s: float = 1.0) -> Status:
-        """How a module is."""
         status: Status = await self._call(self._core.own, self.name(name), calling.STATUS, timeout_s)
         return status
 
     async def switch(self, name: str | Name, on: bool, timeout_s: float = 1.0) -> None:
-        """Switches a module on or off."""
         prepared = calling.prepare_common(wire.ON if on else wire.OFF)
         await self._call(self._core.own, self.name(name), prepared, timeout_s)
 
     async def get(self, name: str | Name, data: str, timeout_s: float = 1.0) -> tuple[int, Any]:
-        """The newest data of a module: when they were true, ns since 1970, and themselves."""
         to = self.name(name)
         prepared = calling.prepare_get(to, await self._describe(self._core.own, to, timeout_s), data)
         time_ns, value = await self._call(self._core.own, to, prepared, timeout_s)
         return time_ns, value
 
     def time(self) -> SystemTime | None:
-        """System time as the TCP router has it, with its error bound; none: it is not known."""
         self._check()
         return self._core.time(passed_ns())
 
@@ -228,7 +199,6 @@ class AsyncClient:
         room: int = 64,
         expected: Any = None,
     ) -> AsyncSubscription:
-        """Follows data of a module; see :meth:`rohrpost.remote.Client.subscribe`."""
         self._check()
         subscription = AsyncSubscription(self, 1 if newest else room)
         self._core.now_ns = passed_ns()
@@ -248,7 +218,6 @@ class AsyncClient:
         expected: Any = None,
         most_bytes: int = RECORD_BYTES_MAX,
     ) -> AsyncRecordStream:
-        """Reads a stream of a module; see :meth:`rohrpost.remote.Client.stream`."""
         self._check()
         reading = AsyncRecordStream(self, room)
         type = calling.expected_type(expected)

@@ -12,7 +12,6 @@ import selectors
 import socket
 import ssl
 import threading
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -26,9 +25,10 @@ from .. import wire
 from . import calling
 from .calls import Call
 from .clock import passed_ns
-from .core import Core, Endpoint, not_connected
+from .core import Endpoint, not_connected
 from .handles import ModuleHost, Proxy, RecordStream, Subscription
 from .session import Settings, Step
+from .shell import Shell
 from .streams import Wanted
 from .timing import SystemTime
 from .transport import Plain, Sealed, Transport
@@ -37,18 +37,14 @@ _CONNECT_S = 5.0
 _READ_BYTES = 65_536
 
 
-class Client:
+class Client(Shell):
     """Takes part at a TCP router; :func:`rohrpost.remote.connect` makes one. Closed at the end of ``with``."""
 
     def __init__(self, server: str, own: Name, settings: Settings, context: ssl.SSLContext | None) -> None:
-        self._server = calling.server_of(server)
-        self._context = context
-        self._pid = os.getpid()
+        super().__init__(server, own, settings, context)
         self._mutex = threading.RLock()
         self._lock = threading.Condition(self._mutex)
-        self._core = Core(settings, own, passed_ns, time.time_ns)
         self._hosts: list[ModuleHost] = []
-        self._is_closed = False
         self._wake_out, self._wake_in = socket.socketpair()
         for end in (self._wake_in, self._wake_out):
             end.setblocking(False)
@@ -83,27 +79,6 @@ class Client:
             if not self._lock.wait_for(lambda: self._core.session.is_up or self._is_closed, timeout_s):
                 raise not_connected(self._core)
 
-    @property
-    def is_up(self) -> bool:
-        """Whether packages leave now."""
-        return self._core.session.is_up
-
-    @property
-    def words(self) -> str:
-        """How the connection stands, for people."""
-        return self._core.words
-
-    @property
-    def connections(self) -> int:
-        """Connections that were made so far."""
-        return self._core.session.connections
-
-    def _check(self) -> None:
-        if self._pid != os.getpid():
-            raise Misuse("this client was opened before a fork, and its connection is the parent's; open one here")
-        if self._is_closed:
-            raise Misuse("this client is closed")
-
     @contextlib.contextmanager
     def _locked(self) -> Iterator[None]:
         """The lock, for what others ask. After a fork a thread that is not there any more may hold it: so the process
@@ -114,10 +89,6 @@ class Client:
             yield
 
     # Calls.
-
-    def name(self, text: str | Name) -> Name:
-        """The module that a text names, such as ``motor.0``."""
-        return self._core.settings.installation.name(text)
 
     def describe(self, name: str | Name, timeout_s: float = 1.0) -> Description:
         """What a module offers."""
