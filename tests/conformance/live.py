@@ -16,6 +16,8 @@ import wire  # noqa: E402
 
 OWN, PEER = "7.96.0.0", "7.97.0.0"
 PATIENCE_S = 20.0
+"""What comes at once on a computer that is not busy has this long; so have calls and leases that are not to end."""
+LONG_MS = 20_000
 COMMON = 4
 DOUBLE, COUNT, REFUSE, AGAIN, BEAT = 16, 17, 18, 19, 1
 MODULE_OFF, INTERRUPTED, INTERFACE_DIFFERS, UNKNOWN, ARGUMENTS, BUSY, EARLIER = 0, 2, 3, 4, 5, 7, 20
@@ -106,7 +108,7 @@ class Peer(wire.Session):
         self.send(its.sender, sender or its.to, -its.kind, its.id, envelope + result, its.priority, options)
 
     def begin(
-        self, to, number, interface, arguments=b"", incarnation=None, sequence=None, age_us=0, options=0, valid=5_000_000
+        self, to, number, interface, arguments=b"", incarnation=None, sequence=None, age_us=0, options=0, valid=LONG_MS * 1000
     ):
         if sequence is None:
             self.sequence += 1
@@ -131,7 +133,7 @@ class Live:
     def __init__(self, client, peer, hash, hosts):
         self.client, self.peer, self.hash, self.to = client, peer, hash, wire.name(hosts)
 
-    def call(self, timeout_ms=5000, number=DOUBLE, arguments=b"\x15"):
+    def call(self, timeout_ms=LONG_MS, number=DOUBLE, arguments=b"\x15"):
         self.client.tell({
             "do": "call", "to": PEER, "function": number, "interface": self.hash, "arguments": arguments.hex(),
             "timeout_ms": timeout_ms,
@@ -148,13 +150,13 @@ class Live:
         require(its.id == its.sequence & 0xFFFF, "the id is the lower half of the sequence")
         require(its.priority == its.sender >> 16 & 0xFF, f"the priority is the class, not {its.priority}")
         require(its.age_us == 0, "a first try has age 0")
-        require(its.valid_us == 5_000_000, f"it is valid for 5 s, not {its.valid_us} us")
+        require(its.valid_us == LONG_MS * 1000, f"it is valid for 20 s, not {its.valid_us} us")
         require((its.interface, its.arguments) == (self.hash, b"\x15"), "interface and arguments")
         self.peer.reply(its, wire.varint(42))
         self.heard({"result": "2a"})
 
     def case_a_call_is_repeated_with_the_same_number_until_its_answer_comes(self):
-        self.call(timeout_ms=3000)
+        self.call(timeout_ms=6000)
         first, second = self.peer.command(DOUBLE), self.peer.command(DOUBLE)
         require((first.incarnation, first.sequence) == (second.incarnation, second.sequence), "the same call")
         require(first.arguments == second.arguments and second.age_us > 0, f"an age: {second.age_us}")
@@ -174,7 +176,7 @@ class Live:
             self.heard({"fault": number})
 
     def case_a_fault_of_one_try_does_not_end_a_call_that_was_repeated(self):
-        self.call(timeout_ms=3000)
+        self.call(timeout_ms=6000)
         self.peer.command(DOUBLE)
         again = self.peer.command(DOUBLE)
         self.peer.reply(again, wire.varint(BUSY), wire.ERROR)
@@ -197,7 +199,7 @@ class Live:
         for _ in range(8):
             self.client.tell({
                 "do": "begin", "to": PEER, "function": DOUBLE, "interface": self.hash, "arguments": "15",
-                "timeout_ms": 10_000,
+                "timeout_ms": LONG_MS,
             })  # fmt: skip
         commands = [self.peer.command(DOUBLE) for _ in range(8)]
         require(len({its.sequence for its in commands}) == 8, "each has a number of its own")
@@ -279,17 +281,23 @@ class Live:
     def data(self):
         return self.peer.next(lambda its: its.kind == wire.data(BEAT) and its.sender == self.to)
 
-    def wish(self, id, period_us=0, lease_ms=3000):
+    def wish(self, id, period_us=0, lease_ms=LONG_MS):
         return wire.varint(BEAT) + wire.varint(id) + wire.varint(period_us) + wire.varint(lease_ms) + b"\x02"
 
     def case_it_publishes_to_its_subscribers(self):
-        require(self.peer.ask(self.to, wire.SUBSCRIBE, self.hash, self.wish(5), options=NEWEST)[0] is None, "taken")
+        for options in (0, NEWEST):
+            self.publishes(options)
+
+    def publishes(self, options):
+        require(self.peer.ask(self.to, wire.SUBSCRIBE, self.hash, self.wish(5), options=options)[0] is None, "taken")
         beats = [self.data() for _ in range(3)]
         numbers = [struct.unpack("<QIII", its.body[:20]) for its in beats]
-        require([number[1] for number in numbers] == [0, 1, 2], f"counted from 0: {numbers}")
+        counts = [number[1] for number in numbers]
+        # Of the newest alone some may have been replaced on the way.
+        require(counts == [0, 1, 2] if not options else counts == sorted(set(counts)), f"counted from 0: {numbers}")
         require(all(number[3] == self.peer.incarnation for number in numbers), "the request's incarnation")
         require(all(its.id == 5 and its.to == self.peer.own | 2 for its in beats), "its id, and local id 2")
-        require(all(its.options & wire.STAMPED and its.options & NEWEST for its in beats), "options")
+        require(all(its.options & (wire.STAMPED | NEWEST) == wire.STAMPED | options for its in beats), "options")
         require(all(its.priority == 97 for its in beats), "the priority of the request")
         values = [wire.unvarint(its.body[20:])[0] for its in beats]
         require(values == sorted(set(values)), f"{values}")
@@ -313,10 +321,13 @@ class Live:
         self.none_left()
 
     def case_a_period_bounds_how_often_data_come(self):
-        wish = self.wish(7, period_us=300_000, lease_ms=5000)
+        wish = self.wish(7, period_us=300_000)
         require(self.peer.ask(self.to, wire.SUBSCRIBE, self.hash, wish)[0] is None, "taken")
-        values = [wire.unvarint(self.data().body[20:])[0] for _ in range(3)]
-        require(all(later > earlier + 1 for earlier, later in zip(values, values[1:])), f"only the newest: {values}")
+        values = [wire.unvarint(self.data().body[20:])[0] for _ in range(2)]
+        # A client that stands still makes fewer values, so that now and then none is left out.
+        while values[-1] <= values[-2] + 1 and len(values) < 20:
+            values.append(wire.unvarint(self.data().body[20:])[0])
+        require(values[-1] > values[-2] + 1, f"only the newest: {values}")
         self.peer.ask(self.to, UNSUBSCRIBE, COMMON, wire.varint(7) + b"\x02")
         refused = self.peer.ask(self.to, wire.SUBSCRIBE, self.hash, self.wish(7)[:-1] + b"\x01")
         require(refused[0] is not None, "mailbox 1 takes no data")
@@ -336,9 +347,15 @@ class Live:
         self.beat(first, id ^ 1, mailbox[0], 1, 99)
         self.beat(first, id, mailbox[0], 1, 97, number=2)
         self.beat(first, id, mailbox[0], 3, 11)
-        began = time.monotonic()
-        again = self.peer.command(wire.SUBSCRIBE)
-        require(time.monotonic() - began < lease_ms / 1000, "it is renewed before the lease ends")
+        # One that stands still may be late once.
+        for _ in range(4):
+            began = time.monotonic()
+            again = self.peer.command(wire.SUBSCRIBE)
+            if time.monotonic() - began < lease_ms / 1000:
+                break
+            self.peer.reply(again, b"")
+        else:
+            raise Wrong("it is renewed after the lease has ended")
         require(again.arguments == first.arguments and again.sequence != first.sequence, "the same, a new call")
         self.peer.reply(again, b"")
         self.beat(again, id, mailbox[0], 4, 12)
