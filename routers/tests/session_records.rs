@@ -224,8 +224,7 @@ impl Case {
         let counts = self.laptop.counts();
         let lost = &counts.received[0].lost;
         let refused = ReplicaLoss::ALL.into_iter().filter(|cause| lost.of(*cause) > 0);
-        let refused: Vec<String> =
-            refused.map(|cause| format!("\"{}\": {}", cause.word(), lost.of(cause))).collect();
+        let refused: Vec<String> = refused.map(|cause| format!("\"{}\": {}", cause.word(), lost.of(cause))).collect();
         format!(
             "{{\"what\": \"{}\", \"stream\": \"steps\", \"place\": {PLACE}, \"record_bytes\": {RECORD_BYTES}, \
              \"records\": [{}], \"lost\": {}, \"sampled\": {}, \"refused\": {{{}}}, \"steps\": [\n{}\n]}}",

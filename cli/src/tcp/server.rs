@@ -1,6 +1,8 @@
 //! The TCP router, as a module.
 
-use super::ends::{PERIOD, ReplicaReport, called, certificates, classes, configured, levels, line_parts, short, streams};
+use super::ends::{
+    PERIOD, ReplicaReport, called, certificates, classes, configured, levels, line_parts, short, streams,
+};
 use crate::router::{NoSettings, faults::Encoded};
 use rohrpost::interfaces::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondStreams, Tcp, TcpInterface,
@@ -138,10 +140,10 @@ fn client(member: MemberSnapshot) -> BeyondClient {
 mod tests {
     use super::*;
     use crate::tcp::ends::NAME_BYTES_MAX;
-    use rohrpost_config::REPLICAS_MAX;
-    use rohrpost_network::NODES_MAX;
     use rohrpost::interfaces::{BeyondNode, BeyondStream, CarriedLoss, ClassPassed};
     use rohrpost::wire::append;
+    use rohrpost_config::REPLICAS_MAX;
+    use rohrpost_network::NODES_MAX;
     use rohrpost_routers::session::Cause;
     use rohrpost_routers::tcp::MEMBERS_MAX;
 

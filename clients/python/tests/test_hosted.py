@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import unittest
 
+from rohrpost.common import Subscribe
 from rohrpost.faults import BUSY, MAILBOX_FULL, Fault
 from rohrpost.names import Name
 from rohrpost.remote.hosted import Hosted
 from rohrpost.remote.timing import SystemTime
 from rohrpost.remote.work import WorkQueue
-from rohrpost.wire import COMMON_HASH, ERROR, ON, SET_PARAMETERS, STATUS, CallEnvelope, Package, package
+from rohrpost.wire import COMMON_HASH, ERROR, ON, SET_PARAMETERS, STATUS, SUBSCRIBE, CallEnvelope, Package, package
 
 from .modules import Probe
 
@@ -47,14 +48,30 @@ class Bounds(unittest.TestCase):
         self.assertLessEqual(held, WorkQueue.MAX)
         self.assertIn(MAILBOX_FULL, self.faults())
 
-    def test_callers_are_bounded_and_forgotten_when_no_repeat_can_come(self) -> None:
-        for sender in range(100):
-            self.hosted.take(self.now_ns, self.command(0x076000 + sender, 1, STATUS, COMMON_HASH))
-        self.assertEqual(self.faults(), [BUSY] * 36)
-        self.now_ns += 70 * SECOND
+    def refused(self, first: int, count: int) -> int:
+        """How many of so many callers are refused a place."""
         self.sent.clear()
-        self.hosted.take(self.now_ns, self.command(0x077000, 1, STATUS, COMMON_HASH))
-        self.assertEqual(self.faults(), [])
+        for sender in range(first, first + count):
+            self.hosted.take(self.now_ns, self.command(sender, 1, STATUS, COMMON_HASH))
+        self.assertEqual({*self.faults()} - {BUSY}, set())
+        return len(self.faults())
+
+    def test_callers_are_bounded_and_forgotten_when_no_repeat_can_come(self) -> None:
+        # Each class, and each other system, gets as many places as it leaves free.
+        self.assertEqual(self.refused(0x076000, 100), 68)
+        self.assertEqual(self.refused(0x076100, 100), 84)
+        self.assertEqual(self.refused(0x086000, 50) + self.refused(0x086100, 50), 92)
+        self.now_ns += 70 * SECOND
+        self.assertEqual(self.refused(0x077000, 32), 0)
+
+    def test_subscriptions_are_shared_alike(self) -> None:
+        publisher = self.hosted.publisher
+        for system, places in ((7, 32), (8, 16), (9, 8)):
+            taken = 0
+            for id in range(100):
+                asked = self.command(system << 16 | 0x6000 | id, 1, SUBSCRIBE, COMMON_HASH)
+                taken += publisher.subscribe(self.now_ns, asked, 1, Subscribe(1, id, 0, 60_000, 2))
+            self.assertEqual(taken, places)
 
 
 if __name__ == "__main__":

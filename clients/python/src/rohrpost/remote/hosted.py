@@ -79,7 +79,7 @@ class Hosted:
         self._incarnation, self._started_ns = incarnation, now_ns
         self._description = self.interface.description.to_bytes()
         self._hash = self.interface.description.hash
-        self._served = Deduplicator(now_ns)
+        self._served = Deduplicator(name, now_ns)
         self._refused = Refused()
         self._parameters = Parameters(module)
         outputs = [it for it in self.interface.outputs.values() if it.mark.rate_hz]

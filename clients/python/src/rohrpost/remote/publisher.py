@@ -6,7 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..common import Subscribe
+from ..names import Name
 from ..wire import LEASE_MS_MAX, NEWEST, STAMPED, DataHead, Package, data_kind, package
+from .places import allows
 
 SUBSCRIPTIONS_MAX = 64
 _PERIOD_US_MIN = 100
@@ -57,7 +59,8 @@ class Publisher:
         wish = Subscribe(wish.number, wish.id, period_us, wish.lease_ms, wish.mailbox)
         known = next((its for its in self._list if its.to == to and its.wish.id == wish.id), None)
         if known is None:
-            if sum(its.ends_ns > now_ns for its in self._list) >= SUBSCRIPTIONS_MAX:
+            held = [its.by for its in self._list if its.ends_ns > now_ns]
+            if not allows(Name(self._own), head.sender, held, SUBSCRIPTIONS_MAX):
                 return False
             known = _Subscription(wish, head.sender, to, incarnation, head.priority, 0, ends_ns, now_ns)
             self._list.append(known)

@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 
 from .. import faults
 from ..faults import Fault
+from ..names import Name
 from ..wire import TRANSIT_NS_MAX, VALIDITY_NS_MAX
+from .places import allows
 
 CALLERS_MAX = 64
 REPLIES_KEPT = 8
@@ -68,9 +70,10 @@ class _Memory:
 
 
 class Deduplicator:
-    """What one server has run. It lives since ``started_ns``."""
+    """What one server, ``own``, has run. It lives since ``started_ns``."""
 
-    def __init__(self, started_ns: int) -> None:
+    def __init__(self, own: Name, started_ns: int) -> None:
+        self._own = own
         self._started_ns = started_ns
         self._callers: dict[int, _Memory] = {}
 
@@ -88,7 +91,7 @@ class Deduplicator:
         if request.age_ns > request.validity_ns:
             is_first = not request.is_repeat and not request.is_redelivered
             return Fault(faults.EXPIRED) if is_first else IGNORE
-        if (known is None or known.until_ns < now_ns) and not self._make_room(now_ns):
+        if (known is None or known.until_ns < now_ns) and not self._make_room(request.sender, now_ns):
             return Fault(faults.BUSY)
         self._note(request, now_ns)
         return RUN
@@ -108,11 +111,12 @@ class Deduplicator:
             return known.answers.get(request.sequence, IGNORE)
         return None
 
-    def _make_room(self, now_ns: int) -> bool:
-        """Forgets callers from which no repeat can come any more; never one that can still repeat."""
-        if len(self._callers) >= CALLERS_MAX:
-            self._callers = {sender: its for sender, its in self._callers.items() if its.until_ns >= now_ns}
-        return len(self._callers) < CALLERS_MAX
+    def _make_room(self, sender: int, now_ns: int) -> bool:
+        """Forgets callers from which no repeat can come any more, if there is no place else; never one that can still
+        repeat."""
+        if not allows(self._own, sender, self._callers, CALLERS_MAX):
+            self._callers = {of: its for of, its in self._callers.items() if its.until_ns >= now_ns}
+        return allows(self._own, sender, self._callers, CALLERS_MAX)
 
     def _note(self, request: Request, now_ns: int) -> None:
         memory = self._callers.get(request.sender)
