@@ -25,6 +25,8 @@ class Connection:
         self.write = write
         self._kept = b""
         self.ranges: list[tuple[int, int]] = []
+        self.registered: list[list[tuple[int, int]]] = []
+        """What it hosted, one registration after the other."""
 
     def received(self, data: bytes) -> None:
         self._kept += data
@@ -47,6 +49,7 @@ class Connection:
             taken = self._router.taken(self, ranges)
             if taken is None:
                 self.ranges = ranges
+                self.registered.append(ranges)
                 self.write(frame(REGISTERED, struct.pack("<IB3xII", number, 0, 0, 0)))
             else:
                 self.write(frame(REGISTERED, struct.pack("<IB3xII", number, 1, *taken) + b"another"))

@@ -125,6 +125,29 @@ class Streams(unittest.TestCase):
         wait(lambda: counts.missed.passed_over == 2)
         self.assertEqual([counts.next(20).value for _ in range(4)], [7, 8, 9, 10])
 
+    def test_a_stream_that_is_opened_later_gets_description_and_newest_record_at_once(self) -> None:
+        client = self.connected("tool.1")
+        counts = client.stream("camera.0", "count")
+        self.describe(3, 4)
+        self.count(1)
+        self.assertEqual(counts.next(20).value, 1)
+        connection = self.server.router.host_of(CLIENT)
+        assert connection is not None
+
+        def hosted() -> list[bool]:
+            return [any(first == CLIENT for first, _ in ranges) for ranges in connection.registered]
+
+        self.assertEqual(hosted(), [False, True])
+        images = client.stream("camera.0", "image")
+        # A real one begins with description and newest record whenever the name has a host again.
+        wait(lambda: hosted() == [False, True, False, True])
+        self.describe(3, 4)
+        self.picture(1)
+        self.count(1)
+        self.count(2)
+        self.assertEqual(images.next(20).sequence, 1)
+        self.assertEqual((counts.next(20).value, counts.refused), (2, {"duplicate": 1}))
+
     def test_an_outage_costs_a_gap(self) -> None:
         client = self.connected("tool.1")
         counts = client.stream("camera.0", "count")

@@ -222,7 +222,7 @@ class AsyncClient(Shell):
         reading = AsyncRecordStream(self, room)
         type = calling.expected_type(expected)
         wanted = Wanted(self.name(name), stream, type, most_bytes, reading._take, reading._said)
-        self._core.streams.add(wanted)
+        self._core.streams.add(passed_ns(), wanted)
         reading._wanted = wanted
         reading._takes_from(wanted.assembly)
         self._soon()

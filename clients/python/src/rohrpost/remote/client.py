@@ -224,7 +224,7 @@ class Client(Shell):
         type = calling.expected_type(expected)
         wanted = Wanted(self.name(name), stream, type, most_bytes, reading._take, reading._said)
         with self._locked():
-            self._core.streams.add(wanted)
+            self._core.streams.add(passed_ns(), wanted)
         reading._wanted = wanted
         reading._takes_from(wanted.assembly)
         self._wake()

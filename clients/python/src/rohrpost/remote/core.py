@@ -121,7 +121,7 @@ class Core:
         mark, waiting = handler.mark, RecordWork(hosted, handler)
         to = self.settings.installation.name(mark.publisher)
         wanted = Wanted(to, mark.stream, handler.type, mark.most_bytes, waiting.take, problem)
-        self.streams.add(wanted)
+        self.streams.add(self.now_ns, wanted)
         endpoint.reads.append(wanted)
 
     def remove(self, now_ns: int, endpoint: Endpoint) -> None:

@@ -106,7 +106,7 @@ class Streams:
 
     # What is wanted.
 
-    def add(self, wanted: Wanted) -> None:
+    def add(self, now_ns: int, wanted: Wanted) -> None:
         """One more. Raises :class:`Misuse`, if this program can have none."""
         if not self._node:
             raise Misuse(
@@ -120,6 +120,11 @@ class Streams:
         self._wanted.append(wanted)
         self._next_ns = 0
         self._place_all()
+        if self.hosts is not None and wanted.place is not None:
+            # Its description and its newest record came already, and nobody wanted them. They come anew to a host that
+            # was none for a moment; what is under way of other streams is given up for that.
+            self.hosts = None
+            self._register(now_ns)
 
     def remove(self, now_ns: int, wanted: Wanted) -> None:
         """It is wanted no more."""
@@ -202,12 +207,11 @@ class Streams:
     def objected(self, now_ns: int, registered: Registered, words: str) -> bool:
         """The server objects to what was registered; whether it is to a name of streams, and that is given up for now:
         then the others hold at least."""
-        if self.hosts is None or not registered.first <= self.hosts.with_local(DATA).raw or (
-            registered.last < self.hosts.raw
-        ):
+        first, last = self.ranges()[0] if self.hosts is not None else (1, 0)
+        if max(first, registered.first) > min(last, registered.last):
             return False
-        problem = f"the streams of node {self._node} do not come here: {words}; one program of a node has them"
-        self._say(RohrpostError(problem))
+        more = "; one program of a node has them" if registered.objection in (1, 2) else ""
+        self._say(RohrpostError(f"the streams of node {self._node} do not come here: {words}{more}"))
         self.hosts, self._next_ns = None, now_ns + _REGISTER_AGAIN_NS
         self._register(now_ns)
         return True
