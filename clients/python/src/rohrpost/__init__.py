@@ -1,7 +1,7 @@
 """Rohrpost for Python: modules of robots, from any computer. :mod:`rohrpost.remote` takes part at a TCP router."""
 
 from .annotations import (
-    F32, F64, I8, I16, I32, I64, I128, U8, U16, U32, U64, U128, Char, Choice, Length, data, members, said,
+    F32, F64, I8, I16, I32, I64, I128, U8, U16, U32, U64, U128, Char, Choice, Length, data, said,
 )  # fmt: skip
 from .common import OutputLevel, State, Status
 from .errors import (
@@ -20,5 +20,5 @@ __all__ = [
     "F32", "F64", "Fault", "FunctionError", "I8", "I16", "I32", "I64", "I128", "Image", "ImageFormat", "Installation",
     "LaserScan", "Length", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry", "OutputLevel", "Pose",
     "RohrpostError", "State", "Status", "TooManyCalls", "Twist", "U8", "U16", "U32", "U64", "U128", "Variant",
-    "command", "data", "data_out", "members", "on_data", "on_record", "parameter", "said",
+    "command", "data", "data_out", "on_data", "on_record", "parameter", "said",
 ]  # fmt: skip

@@ -7,7 +7,7 @@
 | ``T | None``, ``list[T]``, ``dict[K, V]``, ``tuple[A, B]`` | option, list, map, tuple |
 | ``Annotated[list[T], Length(3)]`` | array |
 | a class with :func:`data`: with fields, or an ``enum.Enum`` | struct, enum |
-| a :class:`Choice` | enum of which variants carry something; several members by :data:`members` |
+| a :class:`Choice` | enum of which variants carry something |
 
 ``Annotated[float, said(unit="m/s", min=0.0, text="Forward.")]`` says more of a field or an argument.
 """
@@ -59,8 +59,6 @@ _PLAIN: dict[Any, Type] = {
     None: tree.UNIT,
 }  # fmt: skip
 _ATTRIBUTE = "__rohrpost_type__"
-_CLASSES = "__rohrpost_members__"
-"""Of a choice: by variant the class of which it has the members."""
 
 
 @dataclass(frozen=True)
@@ -68,16 +66,6 @@ class Length:
     """Of a list: that it always has so many elements."""
 
     elements: int
-
-
-@dataclass(frozen=True)
-class Members:
-    """Of what a variant of a :class:`Choice` carries: that its parts are the variant's own. See :data:`members`."""
-
-
-members = Members()
-"""``Turn: Annotated[tuple[I32, bool], members]`` is a variant with two members, and not one that wraps a tuple;
-``Drive: Annotated[Drive, members]`` has the fields of the class."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +85,6 @@ class Choice:
         class DriveError(rp.Choice):
             NotFinite: None
             Hardware: str
-            Range: Annotated[tuple[float, float], rp.members]
 
         DriveError("Hardware", "no answer")
 
@@ -107,8 +94,6 @@ class Choice:
     def __init_subclass__(cls, name: str | None = None) -> None:
         super().__init_subclass__()
         variants = tuple(_variant(cls, *it) for it in _hints(cls).items())
-        classes = {it: typing.get_args(its)[0] for it, its in _hints(cls).items() if _has_members(its)}
-        setattr(cls, _CLASSES, classes)
         setattr(cls, _ATTRIBUTE, tree.Enum(name or cls.__name__, variants, _text(cls), cls))
 
     def __init__(self, name: str, value: Any = None) -> None:
@@ -117,8 +102,6 @@ class Choice:
         if variant is None:
             known = ", ".join(it.name for it in variants)
             raise Misuse(f"{type(self).__name__} has no variant `{name}`; there are: {known}")
-        if variant.kind == 3 and isinstance(value, dict):
-            value = getattr(self, _CLASSES)[name](**value)
         self.name = name
         """Name of the variant."""
         self.value = value
@@ -162,18 +145,8 @@ def data(cls: type[T] | None = None, *, name: str | None = None) -> Any:
     return decorate if cls is None else decorate(cls)
 
 
-def _has_members(annotation: Any) -> bool:
-    return typing.get_origin(annotation) is Annotated and members in typing.get_args(annotation)[1:]
-
-
 def _variant(cls: type, name: str, annotation: Any) -> Named:
     field = field_of("", annotation, f"{cls.__name__}.{name}")
-    if _has_members(annotation):
-        if isinstance(field.type, tree.Tuple):
-            return Named(name, 2, tuple(Field("", it) for it in field.type.elements))
-        if isinstance(field.type, tree.Struct):
-            return Named(name, field.type.named.kind, field.type.named.fields)
-        raise Misuse(f"{cls.__name__}.{name}: members are those of a tuple, or of a class with `@rohrpost.data`")
     return Named(name) if field.type == tree.UNIT else Named(name, 1, (field,))
 
 

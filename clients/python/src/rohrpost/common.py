@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import enum
-from typing import Annotated
 
-from .annotations import U8, U16, U32, U64, Choice, data, members
+from .annotations import U8, U16, U32, U64, Choice, data
 from .schema import tree
 from .schema.tree import Field, Named
 
@@ -134,40 +133,30 @@ class ExchangePage:
     exchanges: list[bytes]
 
 
-@data
-class UnknownParameter:
-    """There is none of that name, but of these."""
-
-    name: str
-    known: str
-
-
-@data
-class WrongType:
-    """The value of a parameter is not of its type."""
-
-    name: str
-    text: str
-
-
-@data
-class OutOfRange:
-    """The value of a parameter is not in its range."""
-
-    name: str
-    value: str
-    range: str
+def _texts(name: str, *fields: str) -> Named:
+    return Named(name, 3, tuple(Field(field, tree.TEXT) for field in fields))
 
 
 class Refusal(Choice):
     """Why parameters are not set."""
 
-    NoParameters: None
-    Unknown: Annotated[UnknownParameter, members]
-    Twice: str
-    Type: Annotated[WrongType, members]
-    Range: Annotated[OutOfRange, members]
-    Module: str
+
+setattr(
+    Refusal,
+    "__rohrpost_type__",
+    tree.Enum(
+        "Refusal",
+        (
+            Named("NoParameters"),
+            _texts("Unknown", "name", "known"),
+            Named("Twice", 1, (Field("", tree.TEXT),)),
+            _texts("Type", "name", "text"),
+            _texts("Range", "name", "value", "range"),
+            Named("Module", 1, (Field("", tree.TEXT),)),
+        ),
+        python=Refusal,
+    ),
+)
 
 
 def result_of(value: tree.Type, error: tree.Type) -> tree.Enum:
