@@ -90,7 +90,7 @@ mod tests {
     use super::*;
     use crate::testing::TestScene;
     use rohrpost::interface::Interface;
-    use rohrpost::interfaces::{ReplicaCause, RouterInterface};
+    use rohrpost::interfaces::{ReplicaCause, RouterInterface, TcpInterface};
     use rohrpost::wire::append;
     use rohrpost_config::Installation;
     use std::path::Path;
@@ -116,6 +116,8 @@ mod tests {
         let item = description.data_item("replicas").unwrap();
         let (mut drawing, mut view) = (TestScene::new(), Replicas::default());
         assert!(view.wants(&description, item));
+        let by_tcp = TcpInterface::description();
+        assert!(view.wants(&by_tcp, by_tcp.data_item("replicas").unwrap()), "of the TCP router and its clients");
         let mut draw = |drawing: &mut TestScene, second, node: &str, sent, received| {
             let mut bytes = Vec::new();
             append(&mut bytes, &ReplicaStates { node: node.into(), sent, received }).unwrap();

@@ -128,6 +128,7 @@ mod tests {
             outages,
             outage,
             waiting_bytes: 0,
+            unknown_parts: 0,
             sent: Vec::new(),
             received: Vec::new(),
         }

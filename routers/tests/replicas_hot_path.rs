@@ -174,6 +174,7 @@ fn parts_take_nothing_from_the_heap() {
         let replica = ReplicaSettings {
             from: ID.name,
             item: "image".into(),
+            stream: "camera.0/image".into(),
             shape,
             node: 0,
             to: 1 << 1,

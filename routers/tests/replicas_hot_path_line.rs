@@ -40,6 +40,7 @@ fn line(own: NodeIndex, node: &Arc<Node>, shape: StreamShape) -> LineReplicas {
     let replica = |to| ReplicaSettings {
         from: ID.name,
         item: "image".into(),
+        stream: "camera.0/image".into(),
         shape,
         node: SERVER,
         to,

@@ -43,6 +43,7 @@ fn replicate(segment: &mut Segment) -> (Writing, [Reading; 2]) {
     let replica = ReplicaSettings {
         from: module(0),
         item: "image".into(),
+        stream: "camera.0/image".into(),
         shape: SHAPE,
         node: 0,
         to: 1 << 1 | 1 << 2,

@@ -130,6 +130,7 @@ mod tests {
             outages: 0,
             outage: None,
             waiting_bytes: 0,
+            unknown_parts: 0,
             sent: Vec::new(),
             received: Vec::new(),
         };

@@ -105,6 +105,7 @@ impl Module for ClientModule {
                     ended_ns: ended_ns.map(told),
                 }),
                 waiting_bytes: link.waiting_bytes,
+                unknown_parts: self.shell.replicas().unknown.get(),
                 sent: classes(&link.out),
                 received: classes(&link.inn),
             },

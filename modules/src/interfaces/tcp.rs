@@ -92,6 +92,9 @@ pub struct BeyondLink {
     /// Memory that waiting packages take up.
     #[schema(unit = "bytes")]
     pub waiting_bytes: u64,
+    /// Parts of replicas that this node has not.
+    #[schema(unit = "parts")]
+    pub unknown_parts: u64,
     /// Classes that sent something there, the most urgent first.
     pub sent: Vec<ClassPassed>,
     /// Classes of which something came from there.

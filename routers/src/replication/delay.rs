@@ -38,10 +38,8 @@ impl DelayAlarm {
         if let Some(records) = self.told.note(now_ns, TOLD_EVERY_NS) {
             let [delay, alarm] = [delay_ns, settings.delay_alarm_ns].map(Duration::from_nanos);
             tracing::warn!(
-                "{records} records of {} of {} came more than {alarm:?} after they were written, the last after \
-                 {delay:?}",
-                settings.item,
-                settings.from
+                "{records} records of {} came more than {alarm:?} after they were written, the last after {delay:?}",
+                settings.stream
             );
         }
     }

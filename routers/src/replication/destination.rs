@@ -98,26 +98,12 @@ impl Destination {
         let behind_max = if self.by_line { 1 } else { keep / 2 };
         let waits = matches!(sampling, Sampling::Rate(_)) && now_ns < self.sample_ns && !self.has_none;
         if self.under_way.is_none() && newest.sequence.saturating_sub(next) >= behind_max && !waits {
-            // Of one in so many: the newest of them.
-            let every = match sampling {
-                Sampling::Every(every) if !self.has_none => u64::from(every.max(1)),
-                _ => 1,
-            };
-            let newest = (newest.sequence - newest.sequence % every).max(next);
-            gone = newest.div_ceil(every) - next.div_ceil(every);
-            self.sample_out(newest - next - gone);
-            next = newest;
+            (next, gone) = self.skip(next, newest.sequence, sampling);
         }
         while self.under_way.is_none() && next <= newest.sequence {
             let sequence = next;
             next += 1;
-            let is_chosen = match sampling {
-                _ if self.has_none => true,
-                Sampling::Each => true,
-                Sampling::Every(every) => sequence.is_multiple_of(u64::from(every.max(1))),
-                Sampling::Rate(_) => now_ns >= self.sample_ns,
-            };
-            if !is_chosen {
+            if !self.is_chosen(now_ns, sequence, sampling) {
                 self.sample_out(1);
                 continue;
             }
@@ -127,16 +113,9 @@ impl Destination {
                 gone += 1;
                 continue;
             };
-            if let Some(fingerprints) = &mut fingerprints {
-                let fingerprint = fingerprints.of(&record);
-                let is_sent = |(sent, at_ns): (Fingerprint, u64)| {
-                    sent == fingerprint && now_ns.saturating_sub(at_ns) < UNCHANGED_EVERY_NS
-                };
-                if !self.has_none && self.sent.is_some_and(is_sent) {
-                    self.sample_out(1);
-                    continue;
-                }
-                self.sent = Some((fingerprint, now_ns));
+            if fingerprints.as_mut().is_some_and(|fingerprints| !self.has_changed(now_ns, fingerprints.of(&record))) {
+                self.sample_out(1);
+                continue;
             }
             (self.under_way, self.has_none) = (Some((record.info(), 0)), false);
             self.pass(std::mem::take(&mut gone), left_out);
@@ -149,6 +128,40 @@ impl Destination {
         self.counts.lost.add(ReplicaLoss::Passed, gone);
         self.next = Some(next);
         self.under_way.is_some()
+    }
+
+    /// From the next record on to the newest one: that, or of one in so many the newest of them. And how many of those
+    /// that would have been sent are passed over.
+    fn skip(&mut self, next: u64, newest: u64, sampling: Sampling) -> (u64, u64) {
+        let every = match sampling {
+            Sampling::Every(every) if !self.has_none => u64::from(every.max(1)),
+            _ => 1,
+        };
+        let newest = (newest - newest % every).max(next);
+        let gone = newest.div_ceil(every) - next.div_ceil(every);
+        self.sample_out(newest - next - gone);
+        (newest, gone)
+    }
+
+    fn is_chosen(&self, now_ns: u64, sequence: u64, sampling: Sampling) -> bool {
+        match sampling {
+            _ if self.has_none => true,
+            Sampling::Each => true,
+            Sampling::Every(every) => sequence.is_multiple_of(u64::from(every.max(1))),
+            Sampling::Rate(_) => now_ns >= self.sample_ns,
+        }
+    }
+
+    /// Whether a record differs from the one that was sent last, or that was long ago; then this one is it.
+    fn has_changed(&mut self, now_ns: u64, fingerprint: Fingerprint) -> bool {
+        let is_same = |(sent, at_ns): (Fingerprint, u64)| {
+            sent == fingerprint && now_ns.saturating_sub(at_ns) < UNCHANGED_EVERY_NS
+        };
+        if !self.has_none && self.sent.is_some_and(is_same) {
+            return false;
+        }
+        self.sent = Some((fingerprint, now_ns));
+        true
     }
 
     /// So many records are left out by the sampling here.

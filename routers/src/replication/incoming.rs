@@ -23,7 +23,7 @@ use super::requests::OutgoingRequest;
 use super::settings::ReplicaSettings;
 use crate::frame::RecordPart;
 use rohrpost_mailbox::{
-    OriginRecord, Participant, ReplicaError, ReplicaWriter, STREAM_SEQUENCE_MAX, StreamId, SystemTime,
+    OriginRecord, Participant, RecordInfo, ReplicaError, ReplicaWriter, STREAM_SEQUENCE_MAX, StreamId, SystemTime,
 };
 use rtrb::Producer;
 use std::sync::Arc;
@@ -142,11 +142,7 @@ impl IncomingReplica {
 
     pub(super) fn tell(&mut self, why: &str) {
         if !std::mem::replace(&mut self.told, true) {
-            tracing::warn!(
-                "the replica of {} of {} is not written for now: {why}",
-                self.settings.item,
-                self.settings.from
-            );
+            tracing::warn!("the replica of {} is not written for now: {why}", self.settings.stream);
         }
     }
 
@@ -216,16 +212,7 @@ impl IncomingReplica {
         let record = arriving.record;
         let newer = &self.open[NEWER];
         let is_behind = newer.is_open() && newer.life == life && record.sequence <= newer.sequence;
-        let (next, newest) = match &self.writer {
-            Some(writer) => (writer.next(), writer.newest()),
-            None => now
-                .participant
-                .node()
-                .inspect_stream(id)
-                .ok()
-                .flatten()
-                .map_or((0, None), |there| (there.written, there.newest)),
-        };
+        let (next, newest) = self.there(now, id);
         if record.sequence < next {
             if newest.is_some_and(|newest| arriving.is(&newest)) {
                 (self.life, self.sampled) = (Some(life), Some(arriving.sampled));
@@ -250,16 +237,7 @@ impl IncomingReplica {
         if record.sequence < next {
             self.close_ring();
         }
-        let mut written = self.write(now, id, record);
-        if matches!(written, Err(Some(_))) && self.writer.is_some() && self.life != Some(life) {
-            // Its time may have begun anew, too: what is there then fits no more.
-            self.close_ring();
-            if let Err(error) = now.participant.node().remove_orphan_stream(id) {
-                self.tell(&format!("its ring of an earlier time cannot be removed: {error}"));
-            }
-            written = self.write(now, id, record);
-        }
-        if let Err(why) = written {
+        if let Err(why) = self.write_anew(now, id, life, record) {
             if self.writer.is_none() {
                 self.retry_ns = now.ns + RETRY_NS;
             }
@@ -268,15 +246,49 @@ impl IncomingReplica {
             return self.refuse(why);
         }
         self.open[NEWER].open_seen(now.ns, arriving, life, self.part_bytes);
+        self.expect_before(now.ns, life, record, step);
+        Some(NEWER)
+    }
+
+    /// What the ring has: the number of its next record, and its newest one.
+    fn there(&self, now: Now<'_>, id: StreamId) -> (u64, Option<RecordInfo>) {
+        if let Some(writer) = &self.writer {
+            return (writer.next(), writer.newest());
+        }
+        let there = now.participant.node().inspect_stream(id).ok().flatten();
+        there.map_or((0, None), |there| (there.written, there.newest))
+    }
+
+    /// Begins the record in the ring. If that does not fit, in a ring made anew where the origin's may be, too.
+    fn write_anew(
+        &mut self,
+        now: Now<'_>,
+        id: StreamId,
+        life: Life,
+        record: OriginRecord,
+    ) -> Result<(), Option<String>> {
+        let written = self.write(now, id, record);
+        if !matches!(written, Err(Some(_))) || self.writer.is_none() || self.life == Some(life) {
+            return written;
+        }
+        // Its time may have begun anew, too: what is there then fits no more.
+        self.close_ring();
+        if let Err(error) = now.participant.node().remove_orphan_stream(id) {
+            self.tell(&format!("its ring of an earlier time cannot be removed: {error}"));
+        }
+        self.write(now, id, record)
+    }
+
+    /// The record that was sent before this one is waited for, if nothing of it has come.
+    fn expect_before(&mut self, now_ns: u64, life: Life, record: OriginRecord, step: u32) {
         let before = record.sequence.checked_sub(step.into()).filter(|_| step > 0);
         let is_lost = |before: &u64| self.writer.as_ref().is_some_and(|writer| *before >= writer.next());
         if let Some(before) = before.filter(is_lost)
             && self.requests.is_some()
             && !self.open[OLDER].is_open()
         {
-            self.open[OLDER].open_unseen(now.ns, before, life);
+            self.open[OLDER].open_unseen(now_ns, before, life);
         }
-        Some(NEWER)
     }
 
     /// Opens a record that is behind the one that arrives: it was asked for, or has come by a longer way.

@@ -95,7 +95,7 @@ impl OutgoingReplica {
 
     fn tell(&mut self, why: &str) {
         if !std::mem::replace(&mut self.told, true) {
-            tracing::warn!("stream {} of {} has no replica for now: {why}", self.settings.item, self.settings.from);
+            tracing::warn!("{} has no replica for now: {why}", self.settings.stream);
         }
     }
 

@@ -12,6 +12,8 @@ pub struct ReplicaSettings {
     pub from: Name,
     /// The stream's name in its interface.
     pub item: String,
+    /// The stream as the configuration names it, such as `laser.0/scan`, for lines of output.
+    pub stream: String,
     /// What the stream is on each node.
     pub shape: StreamShape,
     /// The node on which it is written.
@@ -73,6 +75,7 @@ impl ReplicaSettings {
         Self {
             from: replica.from,
             item: replica.item.clone(),
+            stream: replica.text(installation),
             shape: replica.spec(installation).shape(),
             node: index(node).unwrap_or(NodeIndex::MAX),
             to,

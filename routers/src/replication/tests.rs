@@ -53,10 +53,10 @@ fn words(of: u8) -> Vec<u8> {
 }
 
 fn image() -> ReplicaSettings {
-    let item = "image".into();
     ReplicaSettings {
         from: CAMERA,
-        item,
+        item: "image".into(),
+        stream: "camera.0/image".into(),
         shape: SHAPE,
         node: ORIGIN,
         to: 1 << HOLDER,

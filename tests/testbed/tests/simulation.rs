@@ -109,6 +109,10 @@ fn networks_that_broke_a_promise_once_keep_it() {
         let outcome = run(Plan::new(seed), guard, false);
         assert!(outcome.problems.is_empty(), "{}", told(NETWORKS, seed, &outcome.problems[0]));
     }
+    // A cycle of 70 ms: nodes that read a Sync late, just before their own slot, did not ask.
+    let slotted = 122;
+    let outcome = run(Plan::slotted(slotted), guard, false);
+    assert!(outcome.problems.is_empty(), "{}", told(SLOTTED, slotted, &outcome.problems[0]));
 }
 
 #[test]

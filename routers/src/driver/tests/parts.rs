@@ -74,6 +74,7 @@ impl Replicated {
         let replica = ReplicaSettings {
             from: ID.name,
             item: "image".into(),
+            stream: "camera.0/image".into(),
             shape: SHAPE,
             node: 0,
             to: 1 << HOLDER,

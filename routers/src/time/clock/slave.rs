@@ -11,7 +11,8 @@ use crate::time::{Exchange, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
 /// Samples that a slave needs before it trusts them, and before it is content.
 const SAMPLES_MIN: u32 = 4;
 const SAMPLES_EAGER: u32 = 8;
-/// A slave answers a Sync at most this late: meanwhile its clock drifts from the master's.
+/// A slave answers a Sync at most this late, in time slots a cycle if that is longer: meanwhile its clock drifts from the
+/// master's.
 const ANSWER_NS_MAX: u64 = 50_000_000;
 /// A slave corrects its offset within this time, or four exchanges.
 const SERVO_NS_MIN: u64 = 250_000_000;
@@ -46,7 +47,7 @@ impl Clock {
         }
         self.heard_in_slots(received, sync, heard == SyncOutcome::Turned && is_contested, heard == SyncOutcome::Turned);
         let pauses = received.ns.saturating_sub(self.asked_ns) < self.pause_ns();
-        if pauses || now_ns.saturating_sub(received.ns) > ANSWER_NS_MAX {
+        if pauses || now_ns.saturating_sub(received.ns) > self.answer_ns_max() {
             return Ok(());
         }
         self.asked_ns = received.ns;
@@ -138,6 +139,11 @@ impl Clock {
             Some(_) if is_eager || self.has_question() => 0,
             Some(_) => EXCHANGE_NS_MIN.saturating_sub(self.interval_ns / 2),
         }
+    }
+
+    /// In time slots the thread may read a Sync as late as before this node's own slot, and asks in that slot.
+    fn answer_ns_max(&self) -> u64 {
+        if self.slots.is_some() { ANSWER_NS_MAX.max(self.interval_ns) } else { ANSWER_NS_MAX }
     }
 
     fn has_question(&self) -> bool {

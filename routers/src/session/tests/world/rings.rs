@@ -54,6 +54,7 @@ fn settings(place: usize, node: NodeIndex, to: u64) -> ReplicaSettings {
     ReplicaSettings {
         from: STREAMS[place].0,
         item: "item".into(),
+        stream: format!("sensor.{place}/item"),
         shape: shape(place),
         node,
         to,

@@ -74,6 +74,7 @@ fn settings(plan: &Plan, stream: &StreamPlan) -> ReplicaSettings {
     ReplicaSettings {
         from: stream.id.name,
         item: item(stream.id),
+        stream: format!("{}/{}", stream.id.name, item(stream.id)),
         shape: stream.shape,
         node: stream.node as NodeIndex,
         to: stream.to,
