@@ -77,6 +77,7 @@ impl Case {
         let replica = |to| ReplicaSettings {
             from: ID.name,
             item: "steps".into(),
+            stream: "camera.0/steps".into(),
             shape,
             node: SERVER,
             to,
