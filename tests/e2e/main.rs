@@ -51,6 +51,7 @@ mod param;
 mod ping_send;
 mod printed;
 mod probe;
+mod python_node;
 mod process;
 mod readme;
 mod record;

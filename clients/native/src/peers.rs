@@ -42,8 +42,8 @@ impl Peers {
     }
 
     /// It is asked anew, since it is another by now.
-    pub(crate) fn forget(&mut self, peer: &Peer) {
-        self.0.retain(|(_, known)| known.name != peer.name);
+    pub(crate) fn forget(&mut self, module: &str) {
+        self.0.retain(|(known, _)| known != module);
     }
 }
 
