@@ -5,8 +5,9 @@ use crate::process::Running;
 use nix::sys::signal::Signal;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
+const FAULTY: &str = include_str!("python/faulty.py");
 const PAGE: &str = include_str!("../../docs/src/python-node.md");
 const CONFIG: &str = r#"
 installation = "test"
@@ -40,6 +41,8 @@ name = "motor.0"
 aliases = ["odometry.0", "laser.0", "camera.0"]
 builtin = "sim"
 settings = { map = MAP, seed = 1, odometry-rate-hz = 20, camera-rate-hz = 20 }
+[module.stream.image]
+record = "1 MiB"
 "#;
 
 /// A robot with a gripper in Python. Dropped in this order.
@@ -136,7 +139,10 @@ fn the_gripper_of_the_book_is_a_module_like_any_other() {
     assert!(held.ends_with("{width_m: 0.02, force_n: 4}\n"), "{held}");
     // Parameters: as configured, set, and refused.
     assert_eq!(scene.says(&["param", "get", "gripper.0", "speed-m-s", "--json"]).json()[0]["value"], 0.06);
-    assert_eq!(scene.says(&["param", "set", "gripper.0", "speed-m-s", "0.1"]).ok(), "gripper.0 speed-m-s: 0.06 -> 0.1 m/s\n");
+    assert_eq!(
+        scene.says(&["param", "set", "gripper.0", "speed-m-s", "0.1"]).ok(),
+        "gripper.0 speed-m-s: 0.06 -> 0.1 m/s\n"
+    );
     assert!(scene.says(&["param", "set", "gripper.0", "speed-m-s", "0.3"]).fails().contains("out of range: 0..=0.2"));
     // It reads the camera's stream in place, and writes its own in place, which a tool in Rust reads.
     wait("it has seen pictures", || (scene.written("edge") > 3).then_some(()));
@@ -153,4 +159,111 @@ fn the_gripper_of_the_book_is_a_module_like_any_other() {
         assert_eq!(scene.robot.state("gripper.0"), state);
     }
     scene.stop();
+}
+
+/// What a command answers, as text.
+fn answers(scene: &Scene, command: &str) -> String {
+    scene.says(&["call", "gripper.0", command]).ok()
+}
+
+#[test]
+fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
+    let mut scene = Scene::launched(FAULTY, "mood = \"good\"");
+    scene.robot.wait_on(&mut scene.launch);
+    let line = |of: &str| FAULTY.lines().position(|line| line.contains(of)).unwrap() + 1;
+    let again = || {
+        scene.says(&["off", "gripper.0"]).ok();
+        scene.says(&["on", "gripper.0"]).ok();
+    };
+    // Functions that others call.
+    for (words, told) in [
+        (&["fail", "broken"][..], format!("RuntimeError: broken (./gripper.py:{})", line("raise RuntimeError(why)"))),
+        (&["leave"], format!("SystemExit: 3 (./gripper.py:{})", line("sys.exit(3)"))),
+        (&["wrong"], "the result of `wrong` cannot be written: 300 is out of range: u8 is 0 to 255".into()),
+    ] {
+        let told = told.replace("./", scene.place.path("").to_str().unwrap());
+        let failed = scene.says(&[&["call", "gripper.0"], words].concat()).fails();
+        assert!(failed.contains(&format!("the module is in error: {told}")), "{failed}: {told}");
+        let status = scene.says(&["status", "gripper.0"]).out;
+        assert!(status.contains("error") && status.contains(&told), "{status}");
+        again();
+    }
+    // Those that run with a picture; a view that is kept.
+    for (order, told) in [("fail", "RuntimeError: it is dark ("), ("keep", "Misuse: a view of record ")] {
+        scene.says(&["call", "gripper.0", "order", order]).ok();
+        wait(format!("it is in error: {order}"), || (scene.robot.state("gripper.0") == "error").then_some(()));
+        let status = scene.says(&["status", "gripper.0"]).out;
+        assert!(status.contains(told), "{status}");
+        again();
+    }
+    let set = scene.says(&["param", "set", "gripper.0", "gain", "7"]).fails();
+    assert!(set.contains("the module refuses: ValueError: not seven"), "{set}");
+    assert_eq!(scene.says(&["param", "get", "gripper.0", "gain", "--json"]).json()[0]["value"], 2);
+    // It still sees.
+    let seen: u32 = answers(&scene, "sees").trim().parse().unwrap();
+    wait("it sees", || (answers(&scene, "sees").trim().parse::<u32>().unwrap() > seen).then_some(()));
+    scene.stop();
+}
+
+#[test]
+fn threads_forks_and_the_end_are_told_by_exceptions() {
+    let mut scene = Scene::launched(FAULTY, "mood = \"good\"");
+    scene.robot.wait_on(&mut scene.launch);
+    let own = "for a module's own functions, in its own thread, while it runs";
+    assert!(answers(&scene, "elsewhere").contains(own), "{}", answers(&scene, "elsewhere"));
+    assert!(answers(&scene, "forked").contains("this process was forked from a module's"));
+    assert_eq!(answers(&scene, "strayed").trim(), "70", "a child that comes back is ended");
+    let calls = answers(&scene, "calls");
+    for words in [
+        "has no function `fly`; it has: drive, halt",
+        "BadArguments: the arguments cannot be written: speed_m_s: expected a number (f64), got `fast`",
+        "FunctionError: NotFinite",
+        "RohrpostError: ",
+        "Misuse: Remembered has no data `grip`",
+        "is no stream; follow it as data",
+        "ends with",
+    ] {
+        assert!(calls.contains(words), "{words}: {calls}");
+    }
+    let looks = answers(&scene, "looks");
+    for words in ["memoryview of ", "leave its `with` before", "ValueError: operation forbidden", "the same: true"] {
+        assert!(looks.contains(words), "{words}: {looks}");
+    }
+    scene.stop();
+}
+
+#[test]
+fn by_hand_it_says_why_it_does_not_start_and_ends_by_control_c() {
+    let place = Place::new();
+    let (package, config) = (package(&place), place.path("robot.toml"));
+    std::fs::write(place.path("gripper.py"), FAULTY).unwrap();
+    let started = |settings: &str, arguments: &[&str]| {
+        std::fs::write(&config, CONFIG.replace("MAP", "\"no.map\"").replace("SETTINGS", settings)).unwrap();
+        let mut command = Command::new("python3");
+        command.arg("-B").arg("gripper.py").args(arguments).current_dir(place.path(""));
+        command.env("PYTHONPATH", &package).env("ROHRPOST_DIR", place.memory());
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Running::start(command)
+    };
+    let named = ["--config", config.to_str().unwrap(), "--name", "gripper.0"];
+    for (settings, arguments, code, told) in [
+        ("mood = \"good\"", &named[..2], 2, "which module of it?"),
+        ("mod = \"good\"", &named[..], 1, "it has no setting `mod`; it has gain, mood"),
+        ("mood = \"good\", gain = 11", &named[..], 1, "`gain` is 11, out of range: at most 9"),
+        ("", &named[..], 1, "KeyError: 'mood'"),
+    ] {
+        let settings = if settings.is_empty() { "gain = 1" } else { settings };
+        let said = started(settings, arguments).said();
+        assert!(said.code == Some(code) && said.err.contains(told), "{told}: {said:?}");
+    }
+    let mut module = started("mood = \"good\"", &named);
+    wait("it is on", || {
+        module.assert_runs();
+        place.say_at(&config, "main", &["status", "gripper.0"]).out.starts_with("gripper.0 is on").then_some(())
+    });
+    module.signal(Signal::SIGINT);
+    let said = module.said();
+    assert!(said.code == Some(0) && said.err.contains("safe, in a mood that is good"), "{said:?}");
+    assert!(said.out.contains("Misuse: this is for a module's own functions"), "{said:?}");
+    place.assert_empty();
 }

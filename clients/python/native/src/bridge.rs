@@ -38,7 +38,7 @@ fn started(arguments: Vec<String>, interface: NativeInterface, bridge: Py<PyAny>
     let start = Start::from_arguments(arguments.into_iter())?;
     let names = interface.parameters.iter().map(|parameter| parameter.field.name.clone()).collect();
     rohrpost_native::run(start, interface, move |context| {
-        let module = PythonModule { bridge, names };
+        let module = PythonModule { bridge, names, fields: Vec::new() };
         module.make(context)?;
         Ok(Box::new(module))
     })
@@ -48,6 +48,8 @@ struct PythonModule {
     bridge: Py<PyAny>,
     /// Of its parameters.
     names: Vec<String>,
+    /// Bytes of the fields that it follows, once something came of them: made once, since Python tells types by them.
+    fields: Vec<Option<Py<PyBytes>>>,
 }
 
 impl PythonModule {
@@ -79,6 +81,17 @@ impl PythonModule {
         self.work(context, |bridge| Ok(bridge.call_method1("make", (me, settings, values))?.unbind()))
     }
 
+    /// The bytes of the field of what came.
+    fn field(&mut self, data: &FollowedData<'_>) -> Py<PyBytes> {
+        if self.fields.len() <= data.follow {
+            self.fields.resize_with(data.follow + 1, || None);
+        }
+        let known = &mut self.fields[data.follow];
+        Python::attach(|py| {
+            known.get_or_insert_with(|| PyBytes::new(py, &data.item.field.to_bytes()).unbind()).clone_ref(py)
+        })
+    }
+
     /// All parameters' values.
     fn values(&self, context: &NativeContext<'_>) -> Vec<(String, Vec<u8>)> {
         let value = |name: &String| Some((name.clone(), context.parameter(name)?.to_vec()));
@@ -102,10 +115,10 @@ impl NativeModule for PythonModule {
     }
 
     fn received(&mut self, context: &mut NativeContext<'_>, data: &FollowedData<'_>) -> Result<(), ModuleError> {
+        let field = self.field(data);
         self.work(context, |bridge| {
             let py = bridge.py();
             let value = value(py, data.value, data.place.clone())?;
-            let field = PyBytes::new(py, &data.item.field.to_bytes());
             let arguments = (data.follow, field, value, data.stamp_ns, data.sequence, data.missed);
             Ok(bridge.call_method1("received", arguments)?.unbind())
         })

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import logging
+import sys
 
 from .. import _node
 
@@ -25,6 +27,10 @@ def _level(number: int) -> int:
 
 def listen() -> None:
     """From now on the root logger's records are output. Which of them are sent, the module's output level says."""
+    # What is printed is output, too, line by line.
+    for printed in (sys.stdout, sys.stderr):
+        if isinstance(printed, io.TextIOWrapper):
+            printed.reconfigure(line_buffering=True)
     root = logging.getLogger()
     if not any(isinstance(handler, OutputHandler) for handler in root.handlers):
         root.addHandler(OutputHandler())
