@@ -94,15 +94,17 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
             said(lambda: motor.drive("fast", 0)),
             said(lambda: motor.drive(float("nan"), 0)),
             said(lambda: self.proxy("nothing.0").drive()),
-            said(lambda: self.publish("grip", 1)),
-            said(lambda: self.stream("odometry.0", "odometry")),
-            said(lambda: self.begin("shadow", 0, 5).__enter__()),
+            said(lambda: self.publish("grip", "wide")),
+            said(lambda: self.publish("grab", 1.0)),
+            said(lambda: self.stream("motor.0", "motion")),
+            said(lambda: self.stream("camera.0", "image", rp.Pose)),
+            said(lambda: self.begin("edge", 0, 5).__enter__()),
         ]
 
     @rp.command(24)
     def looks(self) -> list[str]:
         """At the camera's stream."""
-        camera = self.stream("camera.0", "image", timeout_s=20)
+        camera = self.stream("camera.0", "image", rp.Image, timeout_s=20)
         told = []
         with camera.next(timeout_s=20) as record:
             view, number, time_ns = record.value.pixels, record.sequence, record.time_ns
@@ -138,7 +140,7 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         return 0.0
 
     @rp.stream(2)
-    def shadow(self) -> float:
+    def edge(self) -> float:
         """Of what."""
         return 0.0
 

@@ -245,7 +245,7 @@ class NodeHost(ABC):
         """See :meth:`Module.begin`."""
 
     @abstractmethod
-    def stream(self, module: Module, name: str, stream: str, timeout_s: float) -> StreamReader:
+    def stream(self, module: Module, name: str, stream: str, expected: Any, timeout_s: float) -> StreamReader:
         """See :meth:`Module.stream`."""
 
     @abstractmethod
@@ -346,9 +346,11 @@ class Module:
         exception in the block gives it up."""
         return self._on_node().begin(self, stream, value, length, time_ns)
 
-    def stream(self, module: str, stream: str, timeout_s: float = 1.0) -> StreamReader:
-        """A stream of another module, such as ``"camera.0", "image"``, to look at when this one likes."""
-        return self._on_node().stream(self, module, stream, timeout_s)
+    def stream(self, module: str, stream: str, expected: Any = None, timeout_s: float = 1.0) -> StreamReader:
+        """A stream of another module, such as ``"camera.0", "image", rp.Image``, to look at when this one likes.
+        ``expected``: the type that its values must have; without it they are dicts, lists and numbers. The other module
+        is asked what it offers, at most ``timeout_s`` seconds."""
+        return self._on_node().stream(self, module, stream, expected, timeout_s)
 
     def _on_node(self) -> NodeHost:
         host = self._hosted()

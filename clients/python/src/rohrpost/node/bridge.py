@@ -20,6 +20,7 @@ from ..schema.encode import encode
 from ..schema.errors import WalkError
 from ..schema.text import describe_type
 from ..schema.tree import Tuple, Type
+from ..remote.calling import expected_type
 from .failures import words_of
 from .proxies import NodeProxy
 from .streams import StreamReader
@@ -58,7 +59,7 @@ class Bridge(NodeHost):
         self._module: Module | None = None
         self._settings: dict[str, Any] = {}
         self._followed: dict[int, Handler] = {}
-        self._types: dict[bytes, Type] = {}
+        self._types: dict[tuple[str, bytes], Type] = {}
         self._timed = Timed([*self._interface.timed, *self._interface.outputs.values()])
         self._is_configuring = False
 
@@ -154,18 +155,17 @@ class Bridge(NodeHost):
         except WalkError as error:
             return None, False, f"the result of `{handler.name}` cannot be written: {error}"
 
-    @_told
-    def parameters_set(self, values: list[tuple[str, bytes]]) -> None:
-        """Parameters have new values."""
+    def parameters_set(self, values: list[tuple[str, bytes]]) -> str | None:
+        """Parameters have new values; why the module does not want them."""
         module = self._its()
         old = {it.name: getattr(module, it.name) for it in self._interface.parameters}
         self._configure(values)
         try:
             module.parameters_set()
-        except BaseException:
-            for name, value in old.items():
-                module.__dict__[name] = value
-            raise
+        except BaseException as error:  # It is the author's word, whatever its class.
+            module.__dict__.update(old)
+            return str(error) or words_of(error)
+        return None
 
     # For the module.
 
@@ -205,9 +205,10 @@ class Bridge(NodeHost):
     def now_ns(self) -> int:
         return _node.now()[0]
 
-    def stream(self, module: Module, name: str, stream: str, timeout_s: float) -> StreamReader:
+    def stream(self, module: Module, name: str, stream: str, expected: Any, timeout_s: float) -> StreamReader:
         opened, field = _node.open_stream(name, stream, timeout_s)
-        return StreamReader(opened, field, f"`{stream}` of {name}")
+        what = f"`{stream}` of {name}"
+        return StreamReader(opened, self._checked(field, expected_type(expected), what, "it is opened for"), what)
 
     def parameter_set(self, module: Module, parameter: Parameter, value: Any) -> None:
         if not self._is_configuring:
@@ -248,11 +249,18 @@ class Bridge(NodeHost):
 
     def _type(self, field: bytes, handler: Handler, what: str) -> Type:
         """The type of what came, with the author's classes, if the function names one."""
-        if field not in self._types:
-            theirs = field_from_bytes(field).type
-            if handler.type is not None and type_to_bytes(handler.type, True) != type_to_bytes(theirs, True):
-                ours, theirs_text = describe_type(handler.type), describe_type(theirs)
-                words = f"{what} is {theirs_text}, but `{handler.name}` takes {ours}"
-                raise Misuse(f"{words}; names of types and units count, too")
-            self._types[field] = theirs if handler.type is None else handler.type
-        return self._types[field]
+        found = self._types.get((handler.name, field))
+        if found is None:
+            found = self._checked(field, handler.type, what, f"`{handler.name}` takes")
+            self._types[handler.name, field] = found
+        return found
+
+    @staticmethod
+    def _checked(field: bytes, ours: Type | None, what: str, wants: str) -> Type:
+        theirs = field_from_bytes(field).type
+        if ours is None:
+            return theirs
+        if type_to_bytes(ours, True) != type_to_bytes(theirs, True):
+            words = f"{what} is {describe_type(theirs)}, but {wants} {describe_type(ours)}"
+            raise Misuse(f"{words}; names of types and units count, too")
+        return ours

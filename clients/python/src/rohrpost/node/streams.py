@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import BadReply, Misuse, RohrpostError
 from ..names import Name
-from ..schema.binary import field_from_bytes
-from ..schema.errors import SchemaError, WalkError
+from ..schema.errors import WalkError
 from ..schema.tree import Type
 from .views import Held, kept
 
@@ -54,14 +53,12 @@ class StreamReader:
             look(record.value.pixels)
     """
 
-    def __init__(self, stream: Stream, field: bytes, what: str) -> None:
+    def __init__(self, stream: Stream, type: Type, what: str) -> None:
         self._stream, self._what = stream, what
         self._thread = threading.get_ident()
         self._held: Held | None = None
-        try:
-            self.type: Type = field_from_bytes(field).type
-        except SchemaError as error:
-            raise BadReply(Name(0), str(error)) from None
+        self.type = type
+        """Of its values."""
 
     @contextmanager
     def newest(self) -> Iterator[Record]:
