@@ -227,6 +227,8 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
     ] {
         assert!(calls.contains(words), "{words}: {calls}");
     }
+    scene.says(&["call", "gripper.0", "hears", "tick"]).ok();
+    wait("it hears", || answers(&scene, "heard_word").contains("tick, Misuse: -1 is no open").then_some(()));
     let looks = answers(&scene, "looks");
     for words in [
         "memoryview of ",

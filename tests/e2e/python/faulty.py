@@ -28,7 +28,7 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         self.orders: list[str] = []
         self.kept = None
         self.seen = 0
-        self.camera = None
+        self.heard = ""
 
     def switched_off(self) -> None:
         logging.info("safe, in a mood that is %s", self.mood)
@@ -119,6 +119,25 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         thread.start()
         thread.join()
         return told + other
+
+    @rp.command(26)
+    def hears(self, word: str) -> None:
+        """By a pipe that it watches."""
+        reads, writes = os.pipe()
+
+        def ready() -> None:
+            self.heard = os.read(reads, 100).decode()
+            self.unwatch(watch)
+            os.close(reads)
+
+        watch = self.watch(reads, ready)
+        os.write(writes, word.encode())
+        os.close(writes)
+
+    @rp.command(27)
+    def heard_word(self) -> str:
+        """What it heard."""
+        return self.heard + ", " + said(lambda: self.watch(-1, print))
 
     @rp.command(25)
     def sees(self) -> rp.U32:

@@ -9,7 +9,7 @@ use pyo3::types::PyBytes;
 use rohrpost_native::schema::{Description, Field};
 use rohrpost_native::{
     CommandFailure, Fault, FollowedData, ModuleError, NativeContext, NativeInterface, NativeModule, NativeParameter,
-    Start, StartError,
+    Ready, Start, StartError,
 };
 
 /// Runs a module until it is told to end; the number with which its process is to end.
@@ -122,6 +122,11 @@ impl NativeModule for PythonModule {
             let arguments = (data.follow, field, value, data.stamp_ns, data.sequence, data.missed);
             Ok(bridge.call_method1("received", arguments)?.unbind())
         })
+    }
+
+    fn ready(&mut self, context: &mut NativeContext<'_>, ready: Ready) -> Result<(), ModuleError> {
+        let arguments = (ready.watch.number(), ready.readable, ready.writable);
+        self.work(context, |bridge| Ok(bridge.call_method1("ready", arguments)?.unbind()))
     }
 
     fn command(

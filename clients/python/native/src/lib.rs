@@ -15,6 +15,7 @@ mod lent;
 mod publishing;
 mod streams;
 mod values;
+mod watching;
 
 use pyo3::prelude::*;
 
@@ -33,4 +34,6 @@ mod _node {
     use crate::streams::{Stream, open_stream};
     #[pymodule_export]
     use crate::values::Shared;
+    #[pymodule_export]
+    use crate::watching::{unwatch, watch};
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, ContextManager, Protocol, TypeVar
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, ContextManager, Protocol, TypeV
 from .annotations import bound_of, field_of, first_paragraph, hints_of, said, type_of
 from .common import result_of
 from .errors import Misuse
+from .hosts import NodeHost
 from .schema import tree
 from .schema.description import DataItem, Description, Function
 from .schema.encode import encode
@@ -214,45 +214,6 @@ class Host(Protocol):
         """See :meth:`Module.proxy`."""
 
 
-class NodeHost(ABC):
-    """What runs a module on the node, as the module sees it."""
-
-    @property
-    @abstractmethod
-    def settings(self) -> dict[str, Any]:
-        """See :attr:`Module.settings`."""
-
-    @abstractmethod
-    def publish(self, module: Module, data: str, value: Any, time_ns: int | None) -> None:
-        """See :meth:`Module.publish`."""
-
-    @abstractmethod
-    def proxy(self, module: Module, name: str) -> Any:
-        """See :meth:`Module.proxy`."""
-
-    @abstractmethod
-    def now_ns(self) -> int:
-        """See :meth:`Module.now_ns`."""
-
-    @abstractmethod
-    def write(self, module: Module, stream: str, value: Any, time_ns: int | None) -> None:
-        """See :meth:`Module.write`."""
-
-    @abstractmethod
-    def begin(
-        self, module: Module, stream: str, value: Any, length: int, time_ns: int | None
-    ) -> ContextManager[memoryview]:
-        """See :meth:`Module.begin`."""
-
-    @abstractmethod
-    def stream(self, module: Module, name: str, stream: str, expected: Any, timeout_s: float) -> StreamReader:
-        """See :meth:`Module.stream`."""
-
-    @abstractmethod
-    def parameter_set(self, module: Module, parameter: Parameter, value: Any) -> None:
-        """The module itself has set a parameter."""
-
-
 @dataclass(frozen=True)
 class Handler:
     """A function of a module, by its name, and what stands at it. ``type``: of the argument of data; none: any."""
@@ -351,6 +312,16 @@ class Module:
         ``expected``: the type that its values must have; without it they are dicts, lists and numbers. The other module
         is asked what it offers, at most ``timeout_s`` seconds."""
         return self._on_node().stream(self, module, stream, expected, timeout_s)
+
+    def watch(self, file: Any, ready: Callable[[], Any], *, write: bool = False) -> int:
+        """Waits for a descriptor too, or for what has one (``fileno``): a serial line, a socket. While the module is on,
+        ``ready`` is run when there is something to read (``write``: room to write), again as long as there is. Returns
+        what :meth:`unwatch` takes."""
+        return self._on_node().watch(self, file, ready, write)
+
+    def unwatch(self, watch: int) -> bool:
+        """Waits for it no longer; false when it was not waited for."""
+        return self._on_node().unwatch(self, watch)
 
     def _on_node(self) -> NodeHost:
         host = self._hosted()

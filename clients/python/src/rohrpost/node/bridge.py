@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from .. import _node
 from ..errors import FunctionError, Misuse
-from ..interface import Handler, Module, NodeHost, OnRecord, Parameter
+from ..hosts import NodeHost
+from ..interface import Handler, Module, OnRecord, Parameter
 from ..schema import tree
 from ..schema.binary import field_from_bytes, field_to_bytes, type_to_bytes
 from ..schema.decode import decode
@@ -62,6 +63,7 @@ class Bridge(NodeHost):
         self._types: dict[tuple[str, bytes], Type] = {}
         self._timed = Timed([*self._interface.timed, *self._interface.outputs.values()])
         self._is_configuring = False
+        self._watched: dict[int, Callable[[], Any]] = {}
 
     def parameters(self) -> list[tuple[bytes, bytes]]:
         """Bytes of the field and of the default of each."""
@@ -133,6 +135,12 @@ class Bridge(NodeHost):
             is_free = held.release()
         if not is_free:
             raise kept(f"record {sequence} of {what} of {its.publisher}")
+
+    @_told
+    def ready(self, watch: int, readable: bool, writable: bool) -> None:
+        """A descriptor is ready, or at its end."""
+        if watch in self._watched:
+            self._watched[watch]()
 
     def command(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
         """Runs a function: its result; or none, whether the arguments are to blame, and why."""
@@ -209,6 +217,15 @@ class Bridge(NodeHost):
         opened, field = _node.open_stream(name, stream, timeout_s)
         what = f"`{stream}` of {name}"
         return StreamReader(opened, self._checked(field, expected_type(expected), what, "it is opened for"), what)
+
+    def watch(self, module: Module, file: Any, ready: Callable[[], Any], write: bool) -> int:
+        number = _node.watch(file if isinstance(file, int) else file.fileno(), not write, write)
+        self._watched[number] = ready
+        return number
+
+    def unwatch(self, module: Module, watch: int) -> bool:
+        self._watched.pop(watch, None)
+        return _node.unwatch(watch)
 
     def parameter_set(self, module: Module, parameter: Parameter, value: Any) -> None:
         if not self._is_configuring:
