@@ -55,5 +55,4 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
     given = sys.argv[1:] if arguments is None else arguments
     settings = list(module.interface_.settings)
     code = _node.run(given, module.interface_.description.to_bytes(), bridge.parameters(), settings, bridge)
-    bridge.close()
     sys.exit(code)

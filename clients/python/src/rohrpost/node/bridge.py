@@ -69,11 +69,6 @@ class Bridge(NodeHost):
         """Bytes of the field and of the default of each."""
         return [(field_to_bytes(it.field), encode(it.field.type, it.default)) for it in self._interface.parameters]
 
-    def close(self) -> None:
-        """The module's node is left."""
-        if self._module is not None:
-            self._module._host = None
-
     # For the runtime.
 
     @_told
