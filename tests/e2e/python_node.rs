@@ -28,7 +28,6 @@ real-time-from = 256
 [[module]]
 name = "output.0"
 builtin = "output"
-settings = { file = "log" }
 [[module]]
 name = "gripper.0"
 program = "./gripper.py"
