@@ -2,24 +2,19 @@
 
 use super::context::Context;
 use super::endpoint::Endpoint;
-use super::error::StartError;
 use super::hosted::Hosted;
 use super::incarnation::Incarnation;
 use super::received::Received;
 use super::refusals::Cause;
-use super::start::Start;
 use super::stream::{self, FollowedStream, Step};
 use super::subscribed::Origin;
 use crate::common::DataHead;
-use crate::interface::Interfaces;
-use crate::journal::{JournalEvent, Tag, end_unmade, end_unstarted};
-use crate::module::Module;
+use crate::journal::JournalEvent;
+use crate::made::MadeModule;
 use crate::output;
 use rohrpost_mailbox::{
     Kind, ModuleState, OverflowPolicy, Ready, Receiver, Source, Waiting, Watches, monotonic_ns, wait_any,
 };
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -32,93 +27,6 @@ const BURST_TIME: Duration = Duration::from_millis(2);
 /// works without pause (RLIMIT_RTTIME), and a flood, or a period too short for its work, is no reason to be ended.
 const AWAKE_MAX: Duration = Duration::from_millis(250);
 const PAUSE: Duration = Duration::from_micros(50);
-
-/// Runs a module until it is told to end; the whole of a module's `main`.
-///
-/// Launch tells it by its environment what it is; by hand say `--config FILE --name CLASS.INSTANCE` (and `--off`, to
-/// leave it switched off).
-///
-/// ```
-/// use rohrpost_modules::{Module, ModuleError, runtime::Context};
-///
-/// #[derive(serde::Deserialize)]
-/// #[serde(deny_unknown_fields)]
-/// struct Settings {}
-///
-/// struct Idle;
-///
-/// impl Module for Idle {
-///     type Settings = Settings;
-///     type Interfaces = ();
-///
-///     fn new(_: Settings, _: &mut Context) -> Result<Self, ModuleError> {
-///         Ok(Self)
-///     }
-/// }
-///
-/// fn main() -> std::process::ExitCode {
-///     # if true { return std::process::ExitCode::SUCCESS }
-///     rohrpost_modules::run::<Idle>()
-/// }
-/// ```
-pub fn run<M: Module>() -> ExitCode {
-    exit(Start::from_environment().and_then(run_started::<M>))
-}
-
-/// Tells what went wrong, and turns it into an exit code.
-pub fn exit(result: Result<(), StartError>) -> ExitCode {
-    let Err(error) = result else { return ExitCode::SUCCESS };
-    tracing::error!(errno = error.errno(), "{error}");
-    output::flush();
-    if !output::is_installed() {
-        output::print(&error);
-    }
-    ExitCode::from(error.exit_code())
-}
-
-/// Runs a module as something that was started already says: for programs that hold several kinds of module.
-///
-/// ```
-/// # use rohrpost_modules::{Module, runtime::{Start, StartError, run_started}};
-/// fn start<A: Module, B: Module>(first: bool) -> Result<(), StartError> {
-///     let start = Start::from_environment()?;
-///     if first { run_started::<A>(start) } else { run_started::<B>(start) }
-/// }
-/// ```
-///
-/// # Errors
-/// See [`StartError`].
-pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
-    let joined = catch_unwind(AssertUnwindSafe(|| start.join::<M>()));
-    let joined = joined.unwrap_or_else(|panic| {
-        end_unmade(Tag::Panicked, text_of(&*panic));
-        output::flush();
-        std::panic::resume_unwind(panic)
-    });
-    let mut running = joined.inspect_err(|error| match error {
-        StartError::Module { text: why, .. } => end_unmade(Tag::Failed, why),
-        error => end_unstarted(&error.to_string()),
-    })?;
-    let worked = catch_unwind(AssertUnwindSafe(|| {
-        if running.is_replayed() {
-            running.repeat();
-        }
-        running.turn_on_if_wanted();
-        running.go();
-    }));
-    if let Err(panic) = worked {
-        running.panicked(&*panic);
-        std::panic::resume_unwind(panic);
-    }
-    running.end();
-    Ok(())
-}
-
-/// What a panic says.
-fn text_of(panic: &(dyn std::any::Any + Send)) -> &str {
-    let text = panic.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told")
-}
 
 /// A module that runs.
 pub(crate) struct Running<M> {
@@ -136,8 +44,8 @@ pub(crate) struct Running<M> {
     pub(crate) sources: Vec<&'static mut (dyn Source + 'static)>,
 }
 
-impl<M: Module> Running<M> {
-    fn turn_on_if_wanted(&mut self) {
+impl<M: MadeModule> Running<M> {
+    pub(super) fn turn_on_if_wanted(&mut self) {
         // It may have been told to end while it was being made.
         if self.turn_on && !self.stop.load(Ordering::Acquire) {
             // A failure is in the module's state and output.
@@ -145,7 +53,7 @@ impl<M: Module> Running<M> {
         }
     }
 
-    fn go(&mut self) {
+    pub(super) fn go(&mut self) {
         let mut awake_since = Instant::now();
         while !self.stop.load(Ordering::Acquire) {
             let mut busy = self.commands();
@@ -166,8 +74,8 @@ impl<M: Module> Running<M> {
     }
 
     /// A handler panicked; the process is about to end, and launch to start it again.
-    fn panicked(&mut self, panic: &(dyn std::any::Any + Send)) {
-        self.life.panicked(text_of(panic), &mut self.context);
+    pub(super) fn panicked(&mut self, text: &str) {
+        self.life.panicked(text, &mut self.context);
         self.context.journal.end();
         output::flush();
     }
@@ -298,7 +206,7 @@ impl<M: Module> Running<M> {
         slept
     }
 
-    fn end(mut self) {
+    pub(super) fn end(mut self) {
         // What modules did that have ended by now waits for nobody else.
         while self.take_records(FollowedStream::is_whole) {}
         if self.life.state == ModuleState::On {
@@ -327,7 +235,7 @@ impl<M: Module> Running<M> {
 }
 
 /// Hands out a burst of packages of one mailbox; false when there was none.
-fn take<M: Module>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &mut Context) -> bool {
+fn take<M: MadeModule>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &mut Context) -> bool {
     let (local, latest) = (mailbox.name().local(), mailbox.shape().full == OverflowPolicy::Latest);
     burst(|| {
         let Some(package) = mailbox.try_receive() else { return false };
@@ -371,9 +279,4 @@ fn empty<'a>(mut sources: Vec<&mut (dyn Source + 'static)>) -> Vec<&'a mut (dyn 
 /// A mailbox, as one of the things that are waited for.
 fn source(mailbox: &mut Receiver) -> &mut (dyn Source + 'static) {
     mailbox
-}
-
-/// What a module serves, in the order of its endpoints.
-pub(crate) fn served<M: Module>() -> Vec<crate::interface::Served<M>> {
-    M::Interfaces::table()
 }
