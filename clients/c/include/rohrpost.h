@@ -24,6 +24,69 @@
 // A stream as it is without a shape.
 #define ROHRPOST_STREAM_DEFAULT {1024, 64, 8, 0}
 
+// Entries of a table.
+#define ROHRPOST_COUNT(table) (sizeof(table) / sizeof((table)[0]))
+
+// Types that are their kind alone.
+#define ROHRPOST_PLAIN(kind) {kind, 0, NULL, NULL, NULL}
+#define ROHRPOST_UNIT ROHRPOST_PLAIN(ROHRPOST_KIND_UNIT)
+#define ROHRPOST_BOOL ROHRPOST_PLAIN(ROHRPOST_KIND_BOOL)
+#define ROHRPOST_U8 ROHRPOST_PLAIN(ROHRPOST_KIND_U8)
+#define ROHRPOST_U16 ROHRPOST_PLAIN(ROHRPOST_KIND_U16)
+#define ROHRPOST_U32 ROHRPOST_PLAIN(ROHRPOST_KIND_U32)
+#define ROHRPOST_U64 ROHRPOST_PLAIN(ROHRPOST_KIND_U64)
+#define ROHRPOST_U128 ROHRPOST_PLAIN(ROHRPOST_KIND_U128)
+#define ROHRPOST_I8 ROHRPOST_PLAIN(ROHRPOST_KIND_I8)
+#define ROHRPOST_I16 ROHRPOST_PLAIN(ROHRPOST_KIND_I16)
+#define ROHRPOST_I32 ROHRPOST_PLAIN(ROHRPOST_KIND_I32)
+#define ROHRPOST_I64 ROHRPOST_PLAIN(ROHRPOST_KIND_I64)
+#define ROHRPOST_I128 ROHRPOST_PLAIN(ROHRPOST_KIND_I128)
+#define ROHRPOST_F32 ROHRPOST_PLAIN(ROHRPOST_KIND_F32)
+#define ROHRPOST_F64 ROHRPOST_PLAIN(ROHRPOST_KIND_F64)
+#define ROHRPOST_CHAR ROHRPOST_PLAIN(ROHRPOST_KIND_CHAR)
+#define ROHRPOST_TEXT ROHRPOST_PLAIN(ROHRPOST_KIND_TEXT)
+#define ROHRPOST_BYTES ROHRPOST_PLAIN(ROHRPOST_KIND_BYTES)
+
+// Types of others: `types` is a table of `rohrpost_type`, of one entry but for maps (key, value) and tuples.
+#define ROHRPOST_OPTION(types) {ROHRPOST_KIND_OPTION, 1, types, NULL, NULL}
+#define ROHRPOST_LIST(types) {ROHRPOST_KIND_LIST, 1, types, NULL, NULL}
+#define ROHRPOST_ARRAY(length, types) {ROHRPOST_KIND_ARRAY, length, types, NULL, NULL}
+#define ROHRPOST_MAP(types) {ROHRPOST_KIND_MAP, 2, types, NULL, NULL}
+#define ROHRPOST_TUPLE(types) {ROHRPOST_KIND_TUPLE, ROHRPOST_COUNT(types), types, NULL, NULL}
+// A struct: a `rohrpost_named`.
+#define ROHRPOST_STRUCT(named) {ROHRPOST_KIND_STRUCT, 1, NULL, &(named), NULL}
+// An enum: a `rohrpost_named` with its name and text, and a table of its variants.
+#define ROHRPOST_ENUM(named, variants) {ROHRPOST_KIND_ENUM, ROHRPOST_COUNT(variants), NULL, &(named), variants}
+
+// A field, an argument, or what data are; and the same with bounds, as a user would type them.
+#define ROHRPOST_FIELD(name, type, unit, text) {name, type, unit, text, NULL, NULL}
+#define ROHRPOST_BOUNDED(name, type, unit, text, least, most) {name, type, unit, text, least, most}
+// A struct, or a variant with named fields, by a table of them.
+#define ROHRPOST_NAMED(name, text, fields) {name, text, ROHRPOST_MEMBERS_FIELDS, fields, ROHRPOST_COUNT(fields)}
+// A variant with nothing in it, or with one field without a name, which is a table of one.
+#define ROHRPOST_VARIANT(name, text) {name, text, ROHRPOST_MEMBERS_NONE, NULL, 0}
+#define ROHRPOST_VARIANT_OF(name, text, field) {name, text, ROHRPOST_MEMBERS_ONE, field, 1}
+
+// A function, by a table of its arguments; one without arguments.
+#define ROHRPOST_FUNCTION(number, name, arguments, result, text) \
+    {number, name, text, false, arguments, ROHRPOST_COUNT(arguments), result}
+#define ROHRPOST_ASKED(number, name, result, text) {number, name, text, false, NULL, 0, result}
+// A kind of data, and a stream.
+#define ROHRPOST_PUBLISHED(number, name, type, unit, text) \
+    {number, false, {name, type, unit, text, NULL, NULL}}
+#define ROHRPOST_STREAMED(number, name, type, unit, text) {number, true, {name, type, unit, text, NULL, NULL}}
+// A parameter, with the value that it has if the configuration says none, and bounds.
+#define ROHRPOST_PARAMETER(name, type, unit, text, value, least, most) \
+    {{name, type, unit, text, least, most}, value}
+
+// A table and its length; none.
+#define ROHRPOST_ALL(table) table, ROHRPOST_COUNT(table)
+#define ROHRPOST_NONE NULL, 0
+// An interface; `functions` and `data` are `ROHRPOST_ALL(table)` or `ROHRPOST_NONE`.
+#define ROHRPOST_INTERFACE(name, class_name, text, functions, data) {name, class_name, text, functions, data, NULL, 0}
+// The same by the bytes of its description, a table of `uint8_t`.
+#define ROHRPOST_DESCRIBED(bytes) {NULL, NULL, NULL, ROHRPOST_NONE, ROHRPOST_NONE, ROHRPOST_ALL(bytes)}
+
 
 // The body's first 8 bytes are the system time of its making, nanoseconds since 1970, little-endian.
 #define ROHRPOST_OPTION_STAMPED 2
@@ -108,12 +171,93 @@ enum rohrpost_code
   ROHRPOST_LATE = -24,
   // Bytes that are not of the type that is read.
   ROHRPOST_MALFORMED = -25,
+  // What a module itself calls a failure.
+  ROHRPOST_FAILED = -26,
+  // Only a function of a module that runs may call this, in its thread.
+  ROHRPOST_OUTSIDE = -27,
+  // No answer in time: it may have been run, or not.
+  ROHRPOST_TIMEOUT = -28,
+  // The other module did not run it.
+  ROHRPOST_FAULT = -29,
+  // There is no such function, data, stream or parameter.
+  ROHRPOST_NO_ITEM = -30,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
 typedef enum rohrpost_code rohrpost_code;
 #else
 typedef int32_t rohrpost_code;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// How a module follows data or a stream of another one.
+enum rohrpost_follow
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // Each value, as data.
+  ROHRPOST_FOLLOW_EACH = 0,
+  // Of values that wait only the newest, as data.
+  ROHRPOST_FOLLOW_NEWEST = 1,
+  // Each record of a stream of this node, in place.
+  ROHRPOST_FOLLOW_RECORDS = 2,
+  // The newest value once in a period, as data.
+  ROHRPOST_FOLLOW_PERIOD = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum rohrpost_follow rohrpost_follow;
+#else
+typedef uint8_t rohrpost_follow;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// How important a line of output is.
+enum rohrpost_level
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // The module cannot do its work.
+  ROHRPOST_LEVEL_ERROR = 0,
+  // Something is not as it should be.
+  ROHRPOST_LEVEL_WARN = 1,
+  // What a user wants to know.
+  ROHRPOST_LEVEL_INFO = 2,
+  // What an author wants to know.
+  ROHRPOST_LEVEL_DEBUG = 3,
+  // Everything.
+  ROHRPOST_LEVEL_TRACE = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum rohrpost_level rohrpost_level;
+#else
+typedef uint8_t rohrpost_level;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What a struct or variant has in it.
+enum rohrpost_members
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // Nothing.
+  ROHRPOST_MEMBERS_NONE = 0,
+  // One field without a name.
+  ROHRPOST_MEMBERS_ONE = 1,
+  // Several without names.
+  ROHRPOST_MEMBERS_TUPLE = 2,
+  // Fields by their names.
+  ROHRPOST_MEMBERS_FIELDS = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum rohrpost_members rohrpost_members;
+#else
+typedef uint8_t rohrpost_members;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -137,6 +281,163 @@ typedef enum rohrpost_overflow rohrpost_overflow;
 typedef uint8_t rohrpost_overflow;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
+
+// Kinds of types; the numbers are those of the wire format.
+enum rohrpost_kind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // Nothing.
+  ROHRPOST_KIND_UNIT = 0,
+  // True or false.
+  ROHRPOST_KIND_BOOL = 1,
+  // A whole number from 0, of 8 bits.
+  ROHRPOST_KIND_U8 = 2,
+  // 16 bits.
+  ROHRPOST_KIND_U16 = 3,
+  // 32 bits.
+  ROHRPOST_KIND_U32 = 4,
+  // 64 bits.
+  ROHRPOST_KIND_U64 = 5,
+  // 128 bits.
+  ROHRPOST_KIND_U128 = 6,
+  // A whole number with a sign, of 8 bits.
+  ROHRPOST_KIND_I8 = 7,
+  // 16 bits.
+  ROHRPOST_KIND_I16 = 8,
+  // 32 bits.
+  ROHRPOST_KIND_I32 = 9,
+  // 64 bits.
+  ROHRPOST_KIND_I64 = 10,
+  // 128 bits.
+  ROHRPOST_KIND_I128 = 11,
+  // A number with a fraction, of 32 bits.
+  ROHRPOST_KIND_F32 = 12,
+  // 64 bits.
+  ROHRPOST_KIND_F64 = 13,
+  // One character.
+  ROHRPOST_KIND_CHAR = 14,
+  // Text.
+  ROHRPOST_KIND_TEXT = 15,
+  // Bytes.
+  ROHRPOST_KIND_BYTES = 16,
+  // A value of `types[0]`, or none.
+  ROHRPOST_KIND_OPTION = 17,
+  // Any number of `types[0]`.
+  ROHRPOST_KIND_LIST = 18,
+  // `count` of `types[0]`.
+  ROHRPOST_KIND_ARRAY = 19,
+  // Keys of `types[0]`, and what belongs to each, `types[1]`.
+  ROHRPOST_KIND_MAP = 20,
+  // `count` values of `types`, one after the other.
+  ROHRPOST_KIND_TUPLE = 21,
+  // A struct: `named`.
+  ROHRPOST_KIND_STRUCT = 22,
+  // One of `count` `variants`; its name and text are those of `named`.
+  ROHRPOST_KIND_ENUM = 23,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum rohrpost_kind rohrpost_kind;
+#else
+typedef uint8_t rohrpost_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// A struct or a variant: `ROHRPOST_NAMED` writes it.
+typedef struct rohrpost_named {
+  // A name that others may rely on; it counts in the hash.
+  const char *name;
+  // What it is; null: not said.
+  const char *text;
+  // One of `rohrpost_members`.
+  uint8_t members;
+  // What is in it.
+  const struct rohrpost_field *fields;
+  // How many.
+  size_t field_count;
+} rohrpost_named;
+
+// A type: `ROHRPOST_F64` and so on, `ROHRPOST_OPTION`, `ROHRPOST_LIST`, `ROHRPOST_STRUCT` and so on write it.
+typedef struct rohrpost_type {
+  // One of `rohrpost_kind`.
+  uint8_t kind;
+  // Elements of an array or a tuple, variants of an enum.
+  uint32_t count;
+  // Types that it is made of.
+  const struct rohrpost_type *types;
+  // A struct; of an enum its name and text.
+  const struct rohrpost_named *named;
+  // Of an enum.
+  const struct rohrpost_named *variants;
+} rohrpost_type;
+
+// A type in its place: `ROHRPOST_FIELD` writes it.
+typedef struct rohrpost_field {
+  // Its name; null or empty where it has none.
+  const char *name;
+  // Its type.
+  struct rohrpost_type ty;
+  // Unit of its value; null: none.
+  const char *unit;
+  // What it is for; null: not said.
+  const char *text;
+  // Least value, as a user would type it; null: not bounded.
+  const char *least;
+  // Greatest value, likewise.
+  const char *most;
+} rohrpost_field;
+
+// A function that others call.
+typedef struct rohrpost_function {
+  // Its number, 16 to 16383.
+  uint16_t number;
+  // Its name.
+  const char *name;
+  // What it does; null: not said.
+  const char *text;
+  // Whether running it twice does no harm.
+  bool idempotent;
+  // Its arguments, in order.
+  const struct rohrpost_field *arguments;
+  // How many.
+  size_t argument_count;
+  // What it returns.
+  struct rohrpost_type result;
+} rohrpost_function;
+
+// Data or a stream that others read.
+typedef struct rohrpost_data {
+  // Its number, 1 to 16384.
+  uint16_t number;
+  // Whether its values are kept as a stream.
+  bool is_stream;
+  // Its name, type, unit and text.
+  struct rohrpost_field field;
+} rohrpost_data;
+
+// What a module offers: `ROHRPOST_INTERFACE` writes it.
+typedef struct rohrpost_interface {
+  // Its name.
+  const char *name;
+  // Class of the modules that offer it.
+  const char *class_name;
+  // What it is for; null: not said.
+  const char *text;
+  // Its functions, by number.
+  const struct rohrpost_function *functions;
+  // How many.
+  size_t function_count;
+  // Its data and streams, by number.
+  const struct rohrpost_data *data;
+  // How many.
+  size_t data_count;
+  // The description's bytes, in place of all above; null: the tables above.
+  const uint8_t *described;
+  // How many.
+  size_t described_len;
+} rohrpost_interface;
 
 // A node that this thread takes part in.
 typedef struct rohrpost_node {
@@ -206,17 +507,27 @@ typedef struct rohrpost_package {
   uint64_t published_ns;
 } rohrpost_package;
 
-// System time as this computer knows it.
-typedef struct rohrpost_time {
-  // Nanoseconds since 1970.
-  uint64_t ns;
-  // Times of different epochs cannot be subtracted.
-  uint64_t epoch;
-  // How far off it is at most, ns.
-  uint64_t error_ns;
-  // How long ago its source was last heard, ns.
-  uint64_t age_ns;
-} rohrpost_time;
+// A setting that may change while the module runs: `ROHRPOST_PARAMETER` writes it.
+typedef struct rohrpost_parameter {
+  // Its name as the configuration has it, type, unit, text and range.
+  struct rohrpost_field field;
+  // The value that it has if the configuration says none, as a user would type it.
+  const char *value;
+} rohrpost_parameter;
+
+// How a function of a module ends: a code. Below 0 it has failed, and the last error says why: that of the call that
+// failed, or what `rohrpost_fail` was given.
+typedef int32_t rohrpost_outcome;
+
+// Reads values one behind the other. A value that is not there is 0, and all behind it.
+typedef struct rohrpost_decoder {
+  // What is not read yet.
+  const uint8_t *bytes;
+  // How many these are.
+  size_t left;
+  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is read.
+  int32_t state;
+} rohrpost_decoder;
 
 // Writes values one behind the other into bytes of the caller's.
 typedef struct rohrpost_encoder {
@@ -230,15 +541,86 @@ typedef struct rohrpost_encoder {
   int32_t state;
 } rohrpost_encoder;
 
-// Reads values one behind the other. A value that is not there is 0, and all behind it.
-typedef struct rohrpost_decoder {
-  // What is not read yet.
-  const uint8_t *bytes;
-  // How many these are.
-  size_t left;
-  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is read.
-  int32_t state;
-} rohrpost_decoder;
+// Something that came of what a module follows.
+typedef struct rohrpost_followed {
+  // The number that `rohrpost_module_follow` gave.
+  uint32_t follow;
+  // Number of the data in the other's interface.
+  uint16_t number;
+  // The value, until the function returns; of a stream's record in shared memory.
+  const uint8_t *value;
+  // Its bytes.
+  size_t len;
+  // When it was true, ns since 1970.
+  uint64_t stamp_ns;
+  // Its number: of a subscription, or the lower bits of a record's.
+  uint32_t sequence;
+  // Values missed before it; of a stream, records lost so far.
+  uint32_t missed;
+} rohrpost_followed;
+
+// A watched descriptor for which there is something to do.
+typedef struct rohrpost_ready {
+  // The number that `rohrpost_watch` gave.
+  uint32_t watch;
+  // A read will not wait: it brings bytes, the end, or an error.
+  bool readable;
+  // A write will not wait: it takes bytes, or brings an error.
+  bool writable;
+} rohrpost_ready;
+
+// A module. One thread calls all its functions, one at a time, with `user`; any of them may be null. None of them may
+// let an exception of C++ out.
+typedef struct rohrpost_module {
+  // What it offers.
+  const struct rohrpost_interface *interface;
+  // Settings that may change while it runs.
+  const struct rohrpost_parameter *parameters;
+  // How many.
+  size_t parameter_count;
+  // Names of its other settings, see `rohrpost_module_settings`.
+  const char *const *settings;
+  // How many.
+  size_t setting_count;
+  // For the module's own use.
+  void *user;
+  // Once, before all others, switched off: let it follow here what it follows, and set its period. If it fails, the
+  // process ends.
+  rohrpost_outcome (*made)(void *user);
+  // Begins to work. If it fails, the module is in error and stays off.
+  rohrpost_outcome (*on)(void *user);
+  // Goes to its safe state: also when launch has died, and before the process ends.
+  void (*off)(void *user);
+  // Once a period while it is on. If it fails, the module is switched off and in error; so it is with those below.
+  rohrpost_outcome (*tick)(void *user);
+  // Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED` tells the caller that the
+  // arguments cannot be read, `ROHRPOST_NO_ITEM` that there is no such function; the module goes on then. What a
+  // function's own result says is no failure of it.
+  rohrpost_outcome (*command)(void *user,
+                              uint16_t number,
+                              struct rohrpost_decoder *arguments,
+                              struct rohrpost_encoder *reply);
+  // Takes what it follows, while it is on.
+  rohrpost_outcome (*received)(void *user, const struct rohrpost_followed *data);
+  // A descriptor that it watches is ready, while it is on. Called again as long as there is something: read once, or
+  // until there is nothing without waiting; at the end of the bytes, `rohrpost_module_unwatch`.
+  rohrpost_outcome (*ready)(void *user, const struct rohrpost_ready *ready);
+  // These parameters have new values by now. If it fails, the old values are put back, and the caller gets the
+  // reason.
+  rohrpost_outcome (*parameters_changed)(void *user, const char *const *names, size_t count);
+} rohrpost_module;
+
+// System time as this computer knows it.
+typedef struct rohrpost_time {
+  // Nanoseconds since 1970.
+  uint64_t ns;
+  // Times of different epochs cannot be subtracted.
+  uint64_t epoch;
+  // How far off it is at most, ns.
+  uint64_t error_ns;
+  // How long ago its source was last heard, ns.
+  uint64_t age_ns;
+} rohrpost_time;
 
 // Which stream: the name of the module that writes it, and the number that its interface gives it.
 typedef struct rohrpost_stream {
@@ -326,19 +708,16 @@ typedef struct rohrpost_source {
   uint64_t id;
 } rohrpost_source;
 
-// A watched descriptor for which there is something to do.
-typedef struct rohrpost_ready {
-  // The number that `rohrpost_watch` gave.
-  uint32_t watch;
-  // A read will not wait: it brings bytes, the end, or an error.
-  bool readable;
-  // A write will not wait: it takes bytes, or brings an error.
-  bool writable;
-} rohrpost_ready;
-
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+// The hash of an interface, by which callers and servers know that they have the same one, in whatever language each is
+// written. Any thread.
+//
+// Pointers:
+// All tables are as their texts say.
+rohrpost_code rohrpost_interface_hash(const struct rohrpost_interface *interface, uint32_t *hash);
 
 // Words for a code, in a few words; the same for all calls. Static: it is never freed. Any thread.
 const char *rohrpost_error_text(int32_t code);
@@ -405,6 +784,127 @@ rohrpost_code rohrpost_receiver_close(struct rohrpost_receiver receiver);
 
 // Closes a receiver and removes its mailbox; `lost`, which may be null, is how many packages waited there.
 rohrpost_code rohrpost_receiver_remove(struct rohrpost_receiver receiver, size_t *lost);
+
+// Says why a function of a module fails, and returns `ROHRPOST_FAILED` for it to return. Any thread.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_fail(const char *why);
+
+// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls it,
+// with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP.
+//
+// Pointers:
+// All tables are as their texts say, and stay until it returns. `arguments` is null, or points to `count` texts that
+// end with a zero.
+int rohrpost_module_run(const struct rohrpost_module *module, int count, const char *const *arguments);
+
+// Says a line, at a `rohrpost_level`. Any thread; before the module runs, nobody hears it.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_say(uint8_t level, const char *line);
+
+// The module's own name. Only a function of the module may call this, and all `rohrpost_module_...` below.
+rohrpost_code rohrpost_module_name(uint32_t *name);
+
+// System time now.
+rohrpost_code rohrpost_module_now(struct rohrpost_time *now);
+
+// Has `tick` called once in this time, ns, from now on.
+rohrpost_code rohrpost_module_period(uint64_t period_ns);
+
+// The settings that are no parameters, as an object in JSON, with a zero behind it. If the buffer is too small, the
+// last error says how many bytes are needed.
+//
+// Pointers:
+// `buffer` is null, or has room for `size` bytes.
+rohrpost_code rohrpost_module_settings(char *buffer, size_t size);
+
+// The present value of a parameter, to be read at once: it is there until the function ends, or sets one.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_module_parameter(const char *name, struct rohrpost_decoder *value);
+
+// The module sets a parameter of its own.
+//
+// Pointers:
+// The text is null or ends with a zero; `value` is null, or points to `len` bytes.
+rohrpost_code rohrpost_module_set_parameter(const char *name, const void *value, size_t len);
+
+// Publishes a value of the module's data or of a stream, that was true at `stamp_ns`, system time; 0: now. The bytes
+// are copied.
+//
+// Pointers:
+// `value` is null, or points to `len` bytes.
+rohrpost_code rohrpost_module_publish(uint16_t number, uint64_t stamp_ns, const void *value, size_t len);
+
+// Runs a function of another module, `motor.0`, by its number: arguments are values one behind the other, and so is
+// the result, of `reply_len` bytes, which goes into `reply`. Waits for it at most `timeout_ns`, and all else of the
+// module with it. The first call asks the other one what it offers.
+//
+// Pointers:
+// The text is null or ends with a zero. `arguments` is null, or points to `len` bytes. `reply` is null, or has room for
+// `room` bytes.
+rohrpost_code rohrpost_module_call(const char *module,
+                                   uint16_t function,
+                                   const void *arguments,
+                                   size_t len,
+                                   uint64_t timeout_ns,
+                                   void *reply,
+                                   size_t room,
+                                   size_t *reply_len);
+
+// Asks another module for the newest value of its data of this number: its time (ns since 1970, a u64), then the value.
+// For the rest as `rohrpost_module_call`.
+//
+// Pointers:
+// As for `rohrpost_module_call`.
+rohrpost_code rohrpost_module_get(const char *module,
+                                  uint16_t number,
+                                  uint64_t timeout_ns,
+                                  void *reply,
+                                  size_t room,
+                                  size_t *reply_len);
+
+// Has `ready` called when a descriptor is ready for `interest`, bits `ROHRPOST_READ` and `ROHRPOST_WRITE`; `watch` is
+// its number there. The library keeps a duplicate, the caller its own.
+rohrpost_code rohrpost_module_watch(int descriptor, uint8_t interest, uint32_t *watch);
+
+// Watches it no longer.
+rohrpost_code rohrpost_module_unwatch(uint32_t watch);
+
+// Follows data or a stream of another module, by the names of both, as one of `rohrpost_follow` says, once in
+// `period_ns` if that is a period. What comes is given to `received`, with the number that this gives. The other module
+// need not run yet. Only a function of the module may call this.
+//
+// Pointers:
+// Texts are null or end with a zero.
+rohrpost_code rohrpost_module_follow(const char *module,
+                                     const char *item,
+                                     uint8_t how,
+                                     uint64_t period_ns,
+                                     uint32_t *follow);
+
+// Begins a record of a stream whose type ends with bytes: `front` are the values before them and a length of 0, and
+// `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
+// `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
+//
+// Pointers:
+// `front` is null, or points to `front_len` bytes.
+rohrpost_code rohrpost_module_begin(uint16_t number,
+                                    uint64_t stamp_ns,
+                                    const void *front,
+                                    size_t front_len,
+                                    size_t len,
+                                    uint8_t **room);
+
+// Makes the record that is begun the newest of its stream; `sequence`, which may be null, is its number.
+rohrpost_code rohrpost_module_finish(uint64_t *sequence);
+
+// Gives up the record that is begun; nothing is written.
+rohrpost_code rohrpost_module_abandon(void);
 
 // Takes part in the node that launch has started this process on, as its module. The environment says which.
 //

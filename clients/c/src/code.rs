@@ -2,6 +2,9 @@
 
 use rohrpost_config::{Errors, NameTextError};
 use rohrpost_mailbox::{CreateError, NodeError, SendError, StreamError, WriteError};
+use rohrpost_modules::parameter::Refusal;
+use rohrpost_modules::runtime::{ContextError, RecordError};
+use rohrpost_native::{CallError, NativeError};
 use std::ffi::CStr;
 use std::fmt::Display;
 
@@ -65,10 +68,20 @@ pub enum Code {
     Late = -24,
     /// Bytes that are not of the type that is read.
     Malformed = -25,
+    /// What a module itself calls a failure.
+    Failed = -26,
+    /// Only a function of a module that runs may call this, in its thread.
+    Outside = -27,
+    /// No answer in time: it may have been run, or not.
+    Timeout = -28,
+    /// The other module did not run it.
+    Fault = -29,
+    /// There is no such function, data, stream or parameter.
+    NoItem = -30,
 }
 
 /// Words for each code.
-const TEXTS: [(Code, &CStr); 28] = [
+const TEXTS: [(Code, &CStr); 33] = [
     (Code::Ok, c"done"),
     (Code::Nothing, c"nothing is there"),
     (Code::Lost, c"records were lost"),
@@ -97,6 +110,11 @@ const TEXTS: [(Code, &CStr); 28] = [
     (Code::Descriptors, c"no file descriptor left"),
     (Code::Late, c"the stamp is too far behind"),
     (Code::Malformed, c"bytes that are not of this type"),
+    (Code::Failed, c"the module failed"),
+    (Code::Outside, c"only a function of a module may call this"),
+    (Code::Timeout, c"no answer in time"),
+    (Code::Fault, c"the other module did not run it"),
+    (Code::NoItem, c"no such function, data, stream or parameter"),
 ];
 
 /// Words for a number, which may be no code.
@@ -188,6 +206,58 @@ impl Coded for Errors {
 impl Coded for NameTextError {
     fn code(&self) -> Code {
         Code::Configuration
+    }
+}
+
+impl Coded for NativeError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Context(error) => error.code(),
+            Self::Call(error) => error.code(),
+            Self::Read(_) => Code::Damaged,
+            Self::NoItem { .. } | Self::NoStream { .. } | Self::NoNumber(_) => Code::NoItem,
+            Self::RecordOpen => Code::Busy,
+            Self::NoRecordOpen => Code::Value,
+            Self::System(_, error) => error.code(),
+        }
+    }
+}
+
+impl Coded for ContextError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Node(error) => error.code(),
+            Self::Record(RecordError::TooLarge { .. }) => Code::TooLarge,
+            Self::Record(RecordError::Late { .. } | RecordError::OldEpoch { .. }) => Code::Late,
+            Self::Record(_) | Self::Encode(..) => Code::Value,
+            Self::Read(_) => Code::Damaged,
+            Self::TooMany => Code::Crowded,
+            Self::NotStoodIn { .. } => Code::NoItem,
+            _ => Code::Configuration,
+        }
+    }
+}
+
+impl Coded for CallError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Timeout(..) => Code::Timeout,
+            Self::NotSent(error) => error.code(),
+            Self::TooMany(_) => Code::Crowded,
+            Self::Fault(..) => Code::Fault,
+            Self::BadReply(..) => Code::Malformed,
+            Self::BadArguments(_) => Code::TooLarge,
+            Self::Module(_, never) => match *never {},
+        }
+    }
+}
+
+impl Coded for Refusal {
+    fn code(&self) -> Code {
+        match self {
+            Self::NoParameters | Self::Unknown { .. } => Code::NoItem,
+            _ => Code::Value,
+        }
     }
 }
 

@@ -64,6 +64,11 @@ pub extern "C" fn rohrpost_last_error() -> *const c_char {
     LAST.with_borrow(|last| last.bytes.as_ptr().cast())
 }
 
+/// What was wrong with the last call that failed in this thread.
+pub(crate) fn last_words() -> String {
+    LAST.with_borrow(|last| String::from_utf8_lossy(&last.bytes[..last.len]).into_owned())
+}
+
 /// Runs a call: what it returns becomes a code, and so does a panic.
 pub(crate) fn edge(call: impl FnOnce() -> Result<(), Code>) -> Code {
     match catch_unwind(AssertUnwindSafe(call)) {

@@ -18,9 +18,11 @@
 //!   handle, gives it back, or closes it. No call keeps a pointer that it was given.
 
 pub mod code;
+pub mod description;
 pub mod edge;
 mod lender;
 pub mod mailbox;
+pub mod module;
 pub mod node;
 pub mod postcard;
 pub mod stream;

@@ -4,11 +4,12 @@ use crate::code::Code;
 use crate::edge::{bytes_to, edge, failed, needed_text, place, say, text};
 use crate::table;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, Participant, SystemClock, Watches, node_directory};
+use rohrpost_mailbox::{Name, Node, Participant, SystemClock, SystemTime, Watches, node_directory};
 use std::ffi::{c_char, c_uint};
 use std::mem::MaybeUninit;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Which module launch has started this process as, and by which configuration.
 const LAUNCHED: [&str; 2] = ["ROHRPOST_CONFIG", "ROHRPOST_MODULE"];
@@ -32,6 +33,13 @@ pub struct TimeNow {
     pub error_ns: u64,
     /// How long ago its source was last heard, ns.
     pub age_ns: u64,
+}
+
+impl TimeNow {
+    pub(crate) fn of(now: SystemTime) -> Self {
+        let ns = |duration: Duration| u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+        Self { ns: now.ns, epoch: now.epoch, error_ns: ns(now.error), age_ns: ns(now.age) }
+    }
 }
 
 pub(crate) struct NodeObject {
@@ -195,8 +203,7 @@ pub extern "C" fn rohrpost_time_now(node: NodeHandle, now: Option<&mut MaybeUnin
     edge(|| {
         let out = place(now, "now")?;
         let now = table::with(node.id, |node: &mut NodeObject| Ok(node.clock.now()))?;
-        let ns = |duration: std::time::Duration| u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
-        out.write(TimeNow { ns: now.ns, epoch: now.epoch, error_ns: ns(now.error), age_ns: ns(now.age) });
+        out.write(TimeNow::of(now));
         Ok(())
     })
 }

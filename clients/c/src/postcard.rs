@@ -33,6 +33,17 @@ pub struct Decoder {
 }
 
 impl Encoder {
+    /// How many bytes were written, if all values were.
+    pub(crate) fn whole(&self) -> Result<usize, Code> {
+        match self.state {
+            state if state == Code::Ok as i32 => Ok(self.len),
+            state if state == Code::SmallBuffer as i32 => {
+                Err(say(Code::SmallBuffer, format_args!("the values do not fit into {} bytes", self.room)))
+            }
+            _ => Err(say(Code::Value, format_args!("a value that cannot be: a character, a text, or a null pointer"))),
+        }
+    }
+
     fn append(&mut self, write: impl FnOnce(&mut [u8]) -> Option<usize>) {
         if self.state != Code::Ok as i32 {
             return;
@@ -45,6 +56,16 @@ impl Encoder {
             None => self.state = Code::SmallBuffer as i32,
         }
     }
+}
+
+/// To write into these bytes.
+pub(crate) fn encoder(bytes: &mut [u8]) -> Encoder {
+    Encoder { bytes: bytes.as_mut_ptr(), room: bytes.len(), len: 0, state: Code::Ok as i32 }
+}
+
+/// To read these bytes.
+pub(crate) fn decoder(bytes: &[u8]) -> Decoder {
+    Decoder { bytes: bytes.as_ptr(), left: bytes.len(), state: Code::Ok as i32 }
 }
 
 fn put<T: Serialize>(encoder: Option<&mut Encoder>, value: T) {
@@ -90,13 +111,7 @@ pub extern "C" fn rohrpost_encoded(encoder: Option<&Encoder>, len: Option<&mut M
     edge(|| {
         let (encoder, out) = (given(encoder, "encoder")?, place(len, "len")?);
         out.write(encoder.len);
-        match encoder.state {
-            state if state == Code::Ok as i32 => Ok(()),
-            state if state == Code::SmallBuffer as i32 => {
-                Err(say(Code::SmallBuffer, format_args!("the values do not fit into {} bytes", encoder.room)))
-            }
-            _ => Err(say(Code::Value, format_args!("a value that cannot be: a character, a text, or a null pointer"))),
-        }
+        encoder.whole().map(drop)
     })
 }
 

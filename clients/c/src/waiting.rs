@@ -53,25 +53,35 @@ pub extern "C" fn rohrpost_watch(
     watch: Option<&mut MaybeUninit<u32>>,
 ) -> Code {
     edge(|| {
-        let out = place(watch, "watch")?;
-        let interest = match interest {
-            ROHRPOST_READ => Interest::Read,
-            ROHRPOST_WRITE => Interest::Write,
-            3 => Interest::Both,
-            other => return Err(say(Code::Value, format_args!("`interest` is {other}; it is 1, 2 or 3"))),
-        };
-        // SAFETY: the call asks only whether there is such a descriptor.
-        if unsafe { libc::fcntl(descriptor, libc::F_GETFD) } < 0 {
-            return Err(say(Code::Value, format_args!("{descriptor} is no open file descriptor")));
-        }
-        // SAFETY: it is open, and C keeps it open during this call, which duplicates it.
-        let descriptor = unsafe { BorrowedFd::borrow_raw(descriptor) };
+        let (out, interest) = (place(watch, "watch")?, interest_of(interest)?);
+        let descriptor = open_descriptor(descriptor)?;
         table::with(node.id, |node: &mut NodeObject| {
             let watch = watches(node)?.add(&descriptor, interest).map_err(failed)?;
             out.write(watch.number());
             Ok(())
         })
     })
+}
+
+/// What a descriptor is watched for.
+pub(crate) fn interest_of(bits: u8) -> Result<Interest, Code> {
+    const BOTH: u8 = ROHRPOST_READ | ROHRPOST_WRITE;
+    match bits {
+        ROHRPOST_READ => Ok(Interest::Read),
+        ROHRPOST_WRITE => Ok(Interest::Write),
+        BOTH => Ok(Interest::Both),
+        other => Err(say(Code::Value, format_args!("`interest` is {other}; it is 1, 2 or 3"))),
+    }
+}
+
+/// A descriptor of C's, if it is open. It is duplicated at once.
+pub(crate) fn open_descriptor(descriptor: c_int) -> Result<BorrowedFd<'static>, Code> {
+    // SAFETY: the call asks only whether there is such a descriptor.
+    if descriptor < 0 || unsafe { libc::fcntl(descriptor, libc::F_GETFD) } < 0 {
+        return Err(say(Code::Value, format_args!("{descriptor} is no open file descriptor")));
+    }
+    // SAFETY: it is open, and C keeps it open during the call, which duplicates it.
+    Ok(unsafe { BorrowedFd::borrow_raw(descriptor) })
 }
 
 /// The node's watches, made when the first descriptor is watched.
