@@ -712,8 +712,8 @@ typedef struct rohrpost_source {
 extern "C" {
 #endif // __cplusplus
 
-// The hash of an interface, by which callers and servers know that they have the same one, in whatever language each is
-// written. Any thread.
+// The hash of an interface, by which callers and servers know that they have the same one, in whatever language each
+// is written. Any thread.
 //
 // Pointers:
 // All tables are as their texts say.
@@ -728,8 +728,8 @@ const char *rohrpost_last_error(void);
 
 // Opens a mailbox for sending: one of this node, or one that a router leads to.
 //
-// The caller owns the sender, and closes it by `rohrpost_sender_close`. Thread: that of the node, as for all calls with
-// the sender.
+// The caller owns the sender, and closes it by `rohrpost_sender_close`. Thread: that of the node, as for all calls
+// with the sender.
 rohrpost_code rohrpost_sender_open(struct rohrpost_node node, uint32_t name, struct rohrpost_sender *sender);
 
 // Closes a sender; what it has lent is given up.
@@ -748,8 +748,8 @@ rohrpost_code rohrpost_send(struct rohrpost_sender sender,
 // `rohrpost_loan_send` or given up by `rohrpost_loan_drop`, the sender is busy.
 rohrpost_code rohrpost_loan(struct rohrpost_sender sender, uint8_t priority, uint8_t **body, size_t *room);
 
-// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent then,
-// also when this fails.
+// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent
+// then, also when this fails.
 rohrpost_code rohrpost_loan_send(struct rohrpost_sender sender, const struct rohrpost_label *label, size_t len);
 
 // Gives up what is lent: nothing is sent.
@@ -791,8 +791,9 @@ rohrpost_code rohrpost_receiver_remove(struct rohrpost_receiver receiver, size_t
 // The text is null or ends with a zero.
 rohrpost_code rohrpost_fail(const char *why);
 
-// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls it,
-// with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP.
+// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls
+// it, with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP. SIGPIPE is
+// ignored from then on.
 //
 // Pointers:
 // All tables are as their texts say, and stay until it returns. `arguments` is null, or points to `count` texts that
@@ -841,32 +842,27 @@ rohrpost_code rohrpost_module_set_parameter(const char *name, const void *value,
 rohrpost_code rohrpost_module_publish(uint16_t number, uint64_t stamp_ns, const void *value, size_t len);
 
 // Runs a function of another module, `motor.0`, by its number: arguments are values one behind the other, and so is
-// the result, of `reply_len` bytes, which goes into `reply`. Waits for it at most `timeout_ns`, and all else of the
-// module with it. The first call asks the other one what it offers.
+// the result, to be read from `reply`; it is there until the next such call. Waits for it at most `timeout_ns`, and
+// all else of the module with it. The first call asks the other one what it offers.
 //
 // Pointers:
-// The text is null or ends with a zero. `arguments` is null, or points to `len` bytes. `reply` is null, or has room for
-// `room` bytes.
+// The text is null or ends with a zero; `arguments` is null, or points to `len` bytes.
 rohrpost_code rohrpost_module_call(const char *module,
                                    uint16_t function,
                                    const void *arguments,
                                    size_t len,
                                    uint64_t timeout_ns,
-                                   void *reply,
-                                   size_t room,
-                                   size_t *reply_len);
+                                   struct rohrpost_decoder *reply);
 
-// Asks another module for the newest value of its data of this number: its time (ns since 1970, a u64), then the value.
-// For the rest as `rohrpost_module_call`.
+// Asks another module for the newest value of its data of this number: `reply` is its time (ns since 1970, a u64),
+// then the value. For the rest as `rohrpost_module_call`.
 //
 // Pointers:
-// As for `rohrpost_module_call`.
+// The text is null or ends with a zero.
 rohrpost_code rohrpost_module_get(const char *module,
                                   uint16_t number,
                                   uint64_t timeout_ns,
-                                  void *reply,
-                                  size_t room,
-                                  size_t *reply_len);
+                                  struct rohrpost_decoder *reply);
 
 // Has `ready` called when a descriptor is ready for `interest`, bits `ROHRPOST_READ` and `ROHRPOST_WRITE`; `watch` is
 // its number there. The library keeps a duplicate, the caller its own.
@@ -876,8 +872,8 @@ rohrpost_code rohrpost_module_watch(int descriptor, uint8_t interest, uint32_t *
 rohrpost_code rohrpost_module_unwatch(uint32_t watch);
 
 // Follows data or a stream of another module, by the names of both, as one of `rohrpost_follow` says, once in
-// `period_ns` if that is a period. What comes is given to `received`, with the number that this gives. The other module
-// need not run yet. Only a function of the module may call this.
+// `period_ns` if that is a period. What comes is given to `received`, with the number that this gives. The other
+// module need not run yet. Only a function of the module may call this.
 //
 // Pointers:
 // Texts are null or end with a zero.
@@ -1136,8 +1132,8 @@ rohrpost_code rohrpost_stream_reader_release(struct rohrpost_stream_reader reade
 // How many records this reader did not get since it was opened, by cause. What is in hand is released.
 rohrpost_code rohrpost_stream_missed(struct rohrpost_stream_reader reader, struct rohrpost_records_missed *missed);
 
-// Makes this process the writer of a stream; with a null `shape`, of the usual one. Records that an earlier writer left
-// there stay, if the shape is the same.
+// Makes this process the writer of a stream; with a null `shape`, of the usual one. Records that an earlier writer
+// left there stay, if the shape is the same.
 //
 // The caller owns the writer, and closes it by `rohrpost_stream_writer_close`. Thread: that of the node, as for all
 // calls with the writer.
@@ -1160,19 +1156,17 @@ rohrpost_code rohrpost_stream_write(struct rohrpost_stream_writer writer,
                                     size_t len,
                                     uint64_t *sequence);
 
-// Begins a record that is written in place: `body` is its place, of `room` bytes, where anything may stand. Readers see
-// it when it is finished by `rohrpost_stream_finish`; until then, or until `rohrpost_stream_abandon`, the writer is
-// busy.
+// Begins a record that is written in place: `body` is its place, of `room` bytes, where anything may stand. Readers
+// see it when it is finished by `rohrpost_stream_finish`; until then, or until `rohrpost_stream_abandon`, the writer
+// is busy.
 rohrpost_code rohrpost_stream_begin(struct rohrpost_stream_writer writer,
                                     struct rohrpost_stamp at,
                                     uint8_t **body,
                                     size_t *room);
 
-// Makes the first `len` bytes of what is begun the next record; `sequence` may be null. It is no longer begun then, also
-// when this fails.
-rohrpost_code rohrpost_stream_finish(struct rohrpost_stream_writer writer,
-                                     size_t len,
-                                     uint64_t *sequence);
+// Makes the first `len` bytes of what is begun the next record; `sequence` may be null. It is no longer begun then,
+// also when this fails.
+rohrpost_code rohrpost_stream_finish(struct rohrpost_stream_writer writer, size_t len, uint64_t *sequence);
 
 // Gives up what is begun: nothing is written.
 rohrpost_code rohrpost_stream_abandon(struct rohrpost_stream_writer writer);
@@ -1186,10 +1180,10 @@ rohrpost_code rohrpost_watch(struct rohrpost_node node, int descriptor, uint8_t 
 // Watches it no longer. Thread: that of the node.
 rohrpost_code rohrpost_unwatch(struct rohrpost_node node, uint32_t watch);
 
-// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has passed
-// (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what came at the
-// last moment is there too: take from each what is there, and wait again. What has a package or record in hand cannot be
-// waited for: release it first.
+// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has
+// passed (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what
+// came at the last moment is there too: take from each what is there, and wait again. What has a package or record in
+// hand cannot be waited for: release it first.
 //
 // Thread: that of the node and of all sources, which were opened by this node.
 //

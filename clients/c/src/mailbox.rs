@@ -131,8 +131,8 @@ fn shape(shape: &MailboxShape) -> Result<Shape, Code> {
 
 /// Opens a mailbox for sending: one of this node, or one that a router leads to.
 ///
-/// The caller owns the sender, and closes it by `rohrpost_sender_close`. Thread: that of the node, as for all calls with
-/// the sender.
+/// The caller owns the sender, and closes it by `rohrpost_sender_close`. Thread: that of the node, as for all calls
+/// with the sender.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_sender_open(
     node: NodeHandle,
@@ -197,8 +197,8 @@ pub extern "C" fn rohrpost_loan(
     })
 }
 
-/// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent then,
-/// also when this fails.
+/// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent
+/// then, also when this fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_loan_send(sender: SenderHandle, label: Option<&PackageLabel>, len: usize) -> Code {
     edge(|| {

@@ -76,12 +76,14 @@ pub unsafe extern "C" fn rohrpost_fail(why: *const c_char) -> Code {
     edge(|| {
         // SAFETY: the caller's promise.
         let why = unsafe { text(why, "why") }?;
-        Err(say(Code::Failed, format_args!("{}", why.unwrap_or("the module failed"))))
+        // A copy: it may be the last error, which is written here.
+        let why = why.unwrap_or("the module failed").to_owned();
+        Err(say(Code::Failed, format_args!("{why}")))
     })
 }
 
-/// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls it,
-/// with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP. SIGPIPE is
+/// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls
+/// it, with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP. SIGPIPE is
 /// ignored from then on.
 ///
 /// # Safety
