@@ -345,6 +345,16 @@ typedef uint8_t rohrpost_kind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// Reads values one behind the other. A value that is not there is 0, and all behind it.
+typedef struct rohrpost_decoder {
+  // What is not read yet.
+  const uint8_t *bytes;
+  // How many these are.
+  size_t left;
+  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is read.
+  int32_t state;
+} rohrpost_decoder;
+
 // A struct or a variant: `ROHRPOST_NAMED` writes it.
 typedef struct rohrpost_named {
   // A name that others may rely on; it counts in the hash.
@@ -439,6 +449,18 @@ typedef struct rohrpost_interface {
   size_t described_len;
 } rohrpost_interface;
 
+// Writes values one behind the other into bytes of the caller's.
+typedef struct rohrpost_encoder {
+  // Where they go.
+  uint8_t *bytes;
+  // Bytes that there are.
+  size_t room;
+  // Bytes that are written.
+  size_t len;
+  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is written.
+  int32_t state;
+} rohrpost_encoder;
+
 // A node that this thread takes part in.
 typedef struct rohrpost_node {
   // Which; 0 is none.
@@ -518,28 +540,6 @@ typedef struct rohrpost_parameter {
 // How a function of a module ends: a code. Below 0 it has failed, and the last error says why: that of the call that
 // failed, or what `rohrpost_fail` was given.
 typedef int32_t rohrpost_outcome;
-
-// Reads values one behind the other. A value that is not there is 0, and all behind it.
-typedef struct rohrpost_decoder {
-  // What is not read yet.
-  const uint8_t *bytes;
-  // How many these are.
-  size_t left;
-  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is read.
-  int32_t state;
-} rohrpost_decoder;
-
-// Writes values one behind the other into bytes of the caller's.
-typedef struct rohrpost_encoder {
-  // Where they go.
-  uint8_t *bytes;
-  // Bytes that there are.
-  size_t room;
-  // Bytes that are written.
-  size_t len;
-  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is written.
-  int32_t state;
-} rohrpost_encoder;
 
 // Something that came of what a module follows.
 typedef struct rohrpost_followed {
@@ -712,6 +712,70 @@ typedef struct rohrpost_source {
 extern "C" {
 #endif // __cplusplus
 
+// Begins to read values from `len` bytes.
+//
+// Pointers:
+// `bytes` is null, or points to `len` bytes, which stay as they are until all is read.
+struct rohrpost_decoder rohrpost_decode(const void *bytes, size_t len);
+
+// Whether all was read, and nothing is left; else `ROHRPOST_MALFORMED`.
+rohrpost_code rohrpost_decoded(const struct rohrpost_decoder *decoder);
+
+// Reads true or false; also whether an option has a value, which follows then.
+bool rohrpost_get_bool(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 8 bits.
+uint8_t rohrpost_get_u8(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 16 bits.
+uint16_t rohrpost_get_u16(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 32 bits.
+uint32_t rohrpost_get_u32(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 64 bits.
+uint64_t rohrpost_get_u64(struct rohrpost_decoder *decoder);
+
+// Reads a whole number with a sign, of 8 bits.
+int8_t rohrpost_get_i8(struct rohrpost_decoder *decoder);
+
+// Reads a whole number with a sign, of 16 bits.
+int16_t rohrpost_get_i16(struct rohrpost_decoder *decoder);
+
+// Reads a whole number with a sign, of 32 bits.
+int32_t rohrpost_get_i32(struct rohrpost_decoder *decoder);
+
+// Reads a whole number with a sign, of 64 bits.
+int64_t rohrpost_get_i64(struct rohrpost_decoder *decoder);
+
+// Reads a number with a fraction, of 32 bits.
+float rohrpost_get_f32(struct rohrpost_decoder *decoder);
+
+// Reads a number with a fraction, of 64 bits.
+double rohrpost_get_f64(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 128 bits: its lower half, and through `high` the upper one.
+uint64_t rohrpost_get_u128(struct rohrpost_decoder *decoder, uint64_t *high);
+
+// Reads a whole number with a sign, of 128 bits: its lower half, and through `high` the upper one.
+uint64_t rohrpost_get_i128(struct rohrpost_decoder *decoder, int64_t *high);
+
+// Reads a character: its number in Unicode.
+uint32_t rohrpost_get_char(struct rohrpost_decoder *decoder);
+
+// Reads the number of a variant; its fields follow.
+uint32_t rohrpost_get_variant(struct rohrpost_decoder *decoder);
+
+// Reads how many elements a list has, if there may be so many: each takes `bytes_min` bytes at least, which is 1 or
+// more.
+size_t rohrpost_get_length(struct rohrpost_decoder *decoder, size_t bytes_min);
+
+// Reads bytes: where they are, and through `len` how many. They are those of the decoder, not a copy.
+const uint8_t *rohrpost_get_bytes(struct rohrpost_decoder *decoder, size_t *len);
+
+// Reads a text, which is UTF-8: where it is, and through `len` how many bytes. No zero ends it.
+const char *rohrpost_get_text(struct rohrpost_decoder *decoder, size_t *len);
+
 // The hash of an interface, by which callers and servers know that they have the same one, in whatever language each
 // is written. Any thread.
 //
@@ -725,6 +789,77 @@ const char *rohrpost_error_text(int32_t code);
 // What was wrong with the last call of this thread that returned a code below 0, in a sentence that names what it was
 // about. Valid until the next call that fails in this thread. Any thread.
 const char *rohrpost_last_error(void);
+
+// Begins to write values into `room` bytes. Any thread, as for all functions of encoders and decoders: they belong to
+// the caller, and need no end.
+//
+// Pointers:
+// `bytes` is null, or points to `room` bytes, which are the encoder's until it is done.
+struct rohrpost_encoder rohrpost_encode(void *bytes, size_t room);
+
+// How many bytes were written, or `ROHRPOST_SMALL_BUFFER` when they did not fit, `ROHRPOST_VALUE` when a value cannot
+// be.
+rohrpost_code rohrpost_encoded(const struct rohrpost_encoder *encoder, size_t *len);
+
+// Writes true or false; also whether an option has a value, which follows then.
+void rohrpost_put_bool(struct rohrpost_encoder *encoder, bool value);
+
+// Writes a whole number from 0, of 8 bits.
+void rohrpost_put_u8(struct rohrpost_encoder *encoder, uint8_t value);
+
+// Writes a whole number from 0, of 16 bits.
+void rohrpost_put_u16(struct rohrpost_encoder *encoder, uint16_t value);
+
+// Writes a whole number from 0, of 32 bits.
+void rohrpost_put_u32(struct rohrpost_encoder *encoder, uint32_t value);
+
+// Writes a whole number from 0, of 64 bits.
+void rohrpost_put_u64(struct rohrpost_encoder *encoder, uint64_t value);
+
+// Writes a whole number with a sign, of 8 bits.
+void rohrpost_put_i8(struct rohrpost_encoder *encoder, int8_t value);
+
+// Writes a whole number with a sign, of 16 bits.
+void rohrpost_put_i16(struct rohrpost_encoder *encoder, int16_t value);
+
+// Writes a whole number with a sign, of 32 bits.
+void rohrpost_put_i32(struct rohrpost_encoder *encoder, int32_t value);
+
+// Writes a whole number with a sign, of 64 bits.
+void rohrpost_put_i64(struct rohrpost_encoder *encoder, int64_t value);
+
+// Writes a number with a fraction, of 32 bits.
+void rohrpost_put_f32(struct rohrpost_encoder *encoder, float value);
+
+// Writes a number with a fraction, of 64 bits.
+void rohrpost_put_f64(struct rohrpost_encoder *encoder, double value);
+
+// Writes a whole number from 0, of 128 bits.
+void rohrpost_put_u128(struct rohrpost_encoder *encoder, uint64_t high, uint64_t low);
+
+// Writes a whole number with a sign, of 128 bits.
+void rohrpost_put_i128(struct rohrpost_encoder *encoder, int64_t high, uint64_t low);
+
+// Writes a character by its number in Unicode.
+void rohrpost_put_char(struct rohrpost_encoder *encoder, uint32_t value);
+
+// Writes the number of a variant; its fields follow.
+void rohrpost_put_variant(struct rohrpost_encoder *encoder, uint32_t variant);
+
+// Writes how many elements a list has; they follow.
+void rohrpost_put_length(struct rohrpost_encoder *encoder, size_t length);
+
+// Writes bytes, behind how many they are.
+//
+// Pointers:
+// `value` is null, or points to `len` bytes.
+void rohrpost_put_bytes(struct rohrpost_encoder *encoder, const void *value, size_t len);
+
+// Writes a text of `len` bytes, which are UTF-8.
+//
+// Pointers:
+// `value` is null, or points to `len` bytes.
+void rohrpost_put_text(struct rohrpost_encoder *encoder, const char *value, size_t len);
 
 // Opens a mailbox for sending: one of this node, or one that a router leads to.
 //
@@ -883,7 +1018,7 @@ rohrpost_code rohrpost_module_follow(const char *module,
                                      uint64_t period_ns,
                                      uint32_t *follow);
 
-// Begins a record of a stream whose type ends with bytes: `front` are the values before them and a length of 0, and
+// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0, and
 // `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
 // `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
 //
@@ -953,141 +1088,6 @@ rohrpost_code rohrpost_time_now(struct rohrpost_node node, struct rohrpost_time 
 
 // Version of the layout of shared memory that this library reads: both sides of a mailbox have the same. Any thread.
 unsigned int rohrpost_layout_version(void);
-
-// Begins to write values into `room` bytes. Any thread, as for all functions of encoders and decoders: they belong to
-// the caller, and need no end.
-//
-// Pointers:
-// `bytes` is null, or points to `room` bytes, which are the encoder's until it is done.
-struct rohrpost_encoder rohrpost_encode(void *bytes, size_t room);
-
-// How many bytes were written, or `ROHRPOST_SMALL_BUFFER` when they did not fit, `ROHRPOST_VALUE` when a value cannot
-// be.
-rohrpost_code rohrpost_encoded(const struct rohrpost_encoder *encoder, size_t *len);
-
-// Begins to read values from `len` bytes.
-//
-// Pointers:
-// `bytes` is null, or points to `len` bytes, which stay as they are until all is read.
-struct rohrpost_decoder rohrpost_decode(const void *bytes, size_t len);
-
-// Whether all was read, and nothing is left; else `ROHRPOST_MALFORMED`.
-rohrpost_code rohrpost_decoded(const struct rohrpost_decoder *decoder);
-
-// Writes true or false; also whether an option has a value, which follows then.
-void rohrpost_put_bool(struct rohrpost_encoder *encoder, bool value);
-
-// Writes a whole number from 0, of 8 bits.
-void rohrpost_put_u8(struct rohrpost_encoder *encoder, uint8_t value);
-
-// Writes a whole number from 0, of 16 bits.
-void rohrpost_put_u16(struct rohrpost_encoder *encoder, uint16_t value);
-
-// Writes a whole number from 0, of 32 bits.
-void rohrpost_put_u32(struct rohrpost_encoder *encoder, uint32_t value);
-
-// Writes a whole number from 0, of 64 bits.
-void rohrpost_put_u64(struct rohrpost_encoder *encoder, uint64_t value);
-
-// Writes a whole number with a sign, of 8 bits.
-void rohrpost_put_i8(struct rohrpost_encoder *encoder, int8_t value);
-
-// Writes a whole number with a sign, of 16 bits.
-void rohrpost_put_i16(struct rohrpost_encoder *encoder, int16_t value);
-
-// Writes a whole number with a sign, of 32 bits.
-void rohrpost_put_i32(struct rohrpost_encoder *encoder, int32_t value);
-
-// Writes a whole number with a sign, of 64 bits.
-void rohrpost_put_i64(struct rohrpost_encoder *encoder, int64_t value);
-
-// Writes a number with a fraction, of 32 bits.
-void rohrpost_put_f32(struct rohrpost_encoder *encoder, float value);
-
-// Writes a number with a fraction, of 64 bits.
-void rohrpost_put_f64(struct rohrpost_encoder *encoder, double value);
-
-// Writes a whole number from 0, of 128 bits.
-void rohrpost_put_u128(struct rohrpost_encoder *encoder, uint64_t high, uint64_t low);
-
-// Writes a whole number with a sign, of 128 bits.
-void rohrpost_put_i128(struct rohrpost_encoder *encoder, int64_t high, uint64_t low);
-
-// Writes a character by its number in Unicode.
-void rohrpost_put_char(struct rohrpost_encoder *encoder, uint32_t value);
-
-// Writes the number of a variant; its fields follow.
-void rohrpost_put_variant(struct rohrpost_encoder *encoder, uint32_t variant);
-
-// Writes how many elements a list has; they follow.
-void rohrpost_put_length(struct rohrpost_encoder *encoder, size_t length);
-
-// Writes bytes, behind how many they are.
-//
-// Pointers:
-// `value` is null, or points to `len` bytes.
-void rohrpost_put_bytes(struct rohrpost_encoder *encoder, const void *value, size_t len);
-
-// Writes a text of `len` bytes, which are UTF-8.
-//
-// Pointers:
-// `value` is null, or points to `len` bytes.
-void rohrpost_put_text(struct rohrpost_encoder *encoder, const char *value, size_t len);
-
-// Reads true or false; also whether an option has a value, which follows then.
-bool rohrpost_get_bool(struct rohrpost_decoder *decoder);
-
-// Reads a whole number from 0, of 8 bits.
-uint8_t rohrpost_get_u8(struct rohrpost_decoder *decoder);
-
-// Reads a whole number from 0, of 16 bits.
-uint16_t rohrpost_get_u16(struct rohrpost_decoder *decoder);
-
-// Reads a whole number from 0, of 32 bits.
-uint32_t rohrpost_get_u32(struct rohrpost_decoder *decoder);
-
-// Reads a whole number from 0, of 64 bits.
-uint64_t rohrpost_get_u64(struct rohrpost_decoder *decoder);
-
-// Reads a whole number with a sign, of 8 bits.
-int8_t rohrpost_get_i8(struct rohrpost_decoder *decoder);
-
-// Reads a whole number with a sign, of 16 bits.
-int16_t rohrpost_get_i16(struct rohrpost_decoder *decoder);
-
-// Reads a whole number with a sign, of 32 bits.
-int32_t rohrpost_get_i32(struct rohrpost_decoder *decoder);
-
-// Reads a whole number with a sign, of 64 bits.
-int64_t rohrpost_get_i64(struct rohrpost_decoder *decoder);
-
-// Reads a number with a fraction, of 32 bits.
-float rohrpost_get_f32(struct rohrpost_decoder *decoder);
-
-// Reads a number with a fraction, of 64 bits.
-double rohrpost_get_f64(struct rohrpost_decoder *decoder);
-
-// Reads a whole number from 0, of 128 bits: its lower half, and through `high` the upper one.
-uint64_t rohrpost_get_u128(struct rohrpost_decoder *decoder, uint64_t *high);
-
-// Reads a whole number with a sign, of 128 bits: its lower half, and through `high` the upper one.
-uint64_t rohrpost_get_i128(struct rohrpost_decoder *decoder, int64_t *high);
-
-// Reads a character: its number in Unicode.
-uint32_t rohrpost_get_char(struct rohrpost_decoder *decoder);
-
-// Reads the number of a variant; its fields follow.
-uint32_t rohrpost_get_variant(struct rohrpost_decoder *decoder);
-
-// Reads how many elements a list has, if there may be so many: each takes `bytes_min` bytes at least, which is 1 or
-// more.
-size_t rohrpost_get_length(struct rohrpost_decoder *decoder, size_t bytes_min);
-
-// Reads bytes: where they are, and through `len` how many. They are those of the decoder, not a copy.
-const uint8_t *rohrpost_get_bytes(struct rohrpost_decoder *decoder, size_t *len);
-
-// Reads a text, which is UTF-8: where it is, and through `len` how many bytes. No zero ends it.
-const char *rohrpost_get_text(struct rohrpost_decoder *decoder, size_t *len);
 
 // Opens a stream to read, from what is written next on. There may be no such stream yet. Takes one of its places for
 // readers.

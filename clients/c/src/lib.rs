@@ -18,13 +18,15 @@
 //!   handle, gives it back, or closes it. No call keeps a pointer that it was given.
 
 pub mod code;
+pub mod decode;
 pub mod description;
 pub mod edge;
+pub mod encode;
 mod lender;
 pub mod mailbox;
 pub mod module;
 pub mod node;
-pub mod postcard;
+mod objects;
 pub mod stream;
 mod table;
 pub mod waiting;

@@ -2,8 +2,8 @@
 
 use crate::code::Code;
 use crate::edge::{bytes, edge, failed, given, place, say, waiting};
-use crate::lender::Lender;
-use crate::node::{NodeHandle, NodeObject};
+use crate::node::NodeHandle;
+use crate::objects::{NodeObject, ReceiverObject, SenderObject};
 use crate::table;
 use rohrpost_mailbox::{Label, Loan, Name, Options, OverflowPolicy, Package, Priority, Receiver, Sender, Shape, Type};
 use std::ffi::c_void;
@@ -104,9 +104,6 @@ pub struct MailboxShape {
     /// Packages that waited longer are dropped when their turn comes, ns; 0: never.
     pub max_age_ns: u64,
 }
-
-pub(crate) type SenderObject = Lender<Sender, Loan<'static>>;
-pub(crate) type ReceiverObject = Lender<Receiver, Package<'static>>;
 
 fn label(label: &PackageLabel) -> Label {
     Label {

@@ -10,9 +10,10 @@ pub use following::*;
 pub use in_place::*;
 
 use crate::code::Code;
+use crate::decode::{Decoder, decoder};
 use crate::description::{InterfaceTable, ParameterTable, described, list, parameters};
 use crate::edge::{edge, given, last_words, needed_text, say, text};
-use crate::postcard::{Decoder, Encoder, decoder, encoder};
+use crate::encode::{Encoder, encoder};
 use crate::waiting::ReadyDescriptor;
 use current::entered;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Ready};

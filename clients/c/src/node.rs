@@ -2,9 +2,10 @@
 
 use crate::code::Code;
 use crate::edge::{bytes_to, edge, failed, needed_text, place, say, text};
+use crate::objects::NodeObject;
 use crate::table;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, Participant, SystemClock, SystemTime, Watches, node_directory};
+use rohrpost_mailbox::{Name, Node, Participant, SystemClock, SystemTime, node_directory};
 use std::ffi::{c_char, c_uint};
 use std::mem::MaybeUninit;
 use std::path::Path;
@@ -40,14 +41,6 @@ impl TimeNow {
         let ns = |duration: Duration| u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
         Self { ns: now.ns, epoch: now.epoch, error_ns: ns(now.error), age_ns: ns(now.age) }
     }
-}
-
-pub(crate) struct NodeObject {
-    pub(crate) participant: Arc<Participant>,
-    /// Descriptors that it waits for besides mailboxes; made with the first of them.
-    pub(crate) watches: Option<Watches>,
-    clock: SystemClock,
-    installation: Option<Arc<Installation>>,
 }
 
 impl NodeObject {

@@ -2,9 +2,8 @@
 
 use crate::code::Code;
 use crate::edge::{edge, failed, place, say, waiting};
-use crate::mailbox::ReceiverObject;
-use crate::node::{NodeHandle, NodeObject};
-use crate::stream::ReaderObject;
+use crate::node::NodeHandle;
+use crate::objects::{NodeObject, ReaderObject, ReceiverObject};
 use crate::table;
 use arrayvec::ArrayVec;
 use rohrpost_mailbox::{Interest, Participant, Source, Watch, Watches, wait_any};

@@ -113,6 +113,13 @@ fn the_static_library_needs_what_its_pkg_config_file_says() {
 }
 
 #[test]
+fn packages_and_records_take_nothing_from_the_heap() {
+    let folder = tempfile::tempdir_in("/dev/shm").unwrap();
+    let program = compiled(folder.path(), ("gcc", &["-std=c11"]), "hot_path.c");
+    assert_eq!(runs(Command::new(program), folder.path()), "");
+}
+
+#[test]
 fn wrappers_in_c_plus_plus() {
     every_way("wrappers.cpp", "");
 }

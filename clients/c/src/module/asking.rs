@@ -2,9 +2,9 @@
 
 use super::current::with_context;
 use crate::code::Code;
+use crate::decode::{Decoder, decoder};
 use crate::edge::{bytes, bytes_to, edge, failed, needed_text, place, say};
 use crate::node::TimeNow;
-use crate::postcard::{Decoder, decoder};
 use crate::waiting::{interest_of, open_descriptor};
 use rohrpost_mailbox::Watch;
 use rohrpost_native::{CallError, Fault, Moment, NativeContext, Peer, SayLevel, say as say_line};

@@ -14,7 +14,7 @@ thread_local! {
     static OWN: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Begins a record of a stream whose type ends with bytes: `front` are the values before them and a length of 0, and
+/// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0, and
 /// `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
 /// `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
 ///

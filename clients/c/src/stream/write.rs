@@ -3,8 +3,8 @@
 use super::{RecordStamp, RingShape, StreamNumber, id, shape, stamp};
 use crate::code::Code;
 use crate::edge::{bytes, edge, failed, place, say};
-use crate::lender::Lender;
-use crate::node::{NodeHandle, NodeObject};
+use crate::node::NodeHandle;
+use crate::objects::{NodeObject, WriterObject};
 use crate::table;
 use rohrpost_mailbox::{OpenRecord, StreamWriter};
 use std::ffi::c_void;
@@ -17,8 +17,6 @@ pub struct WriterHandle {
     /// Which; 0 is none.
     pub id: u64,
 }
-
-pub(crate) type WriterObject = Lender<StreamWriter, OpenRecord<'static>>;
 
 /// Makes this process the writer of a stream; with a null `shape`, of the usual one. Records that an earlier writer
 /// left there stay, if the shape is the same.
