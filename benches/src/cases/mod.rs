@@ -3,6 +3,8 @@
 mod case;
 mod cost;
 mod flood;
+#[cfg(feature = "languages")]
+pub mod languages;
 #[cfg(feature = "lan")]
 pub mod lan;
 mod latency;
@@ -30,8 +32,8 @@ use crate::harness::{Failure, Scheduling};
 /// # Errors
 /// When it does not do that.
 pub fn run_hidden_program() -> Option<Result<(), Failure>> {
-    #[cfg(feature = "recording")]
-    if let Some(done) = recording::run_hidden_module() {
+    #[cfg(any(feature = "languages", feature = "recording"))]
+    if let Some(done) = crate::motor::run_hidden_module() {
         return Some(done);
     }
     startup::run_hidden_program()

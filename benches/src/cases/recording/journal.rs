@@ -5,22 +5,20 @@
 use super::super::Case;
 use super::super::case::{Done, as_failure};
 use crate::harness::{
-    Child, End, Failure, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
+    End, Failure, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
 };
+use crate::motor::start_motor;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, StreamId, node_directory};
 use rohrpost_modules::call::Caller;
 use rohrpost_modules::interface::Proxy;
-use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy};
+use rohrpost_modules::interfaces::MotorProxy;
 use rohrpost_modules::journal::JOURNAL_NUMBER;
-use rohrpost_modules::runtime::{Context, Start, ToolLink, run_started};
-use rohrpost_modules::{Module, ModuleError};
+use rohrpost_modules::runtime::ToolLink;
 use std::fs;
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -35,8 +33,6 @@ const LOOK_EACH: Duration = Duration::from_millis(2);
 /// No command waits longer for its answer.
 const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 const PATIENCE: Duration = Duration::from_secs(120);
-/// Set for the hidden program that is the module.
-const ROLE: &str = "ROHRPOST_BENCH_MODULE";
 const MOTOR: Name = Name::new(1, 200, 0, 0);
 const NODE: &str = "main";
 const CONFIGURATION: &str = r#"
@@ -109,7 +105,7 @@ fn turn(settings: &Settings, event: &NotedEvent, has_journal: bool) -> Result<Ve
     let recording = if has_journal { RECORDING.replace("MODULE", "motor.0") } else { String::new() };
     fs::write(&config, format!("{CONFIGURATION}{recording}"))
         .map_err(|error| Failure::of("its configuration", error))?;
-    let mut module = start_module(&scratch.directory(), &config, event.placement())?;
+    let mut module = start_motor(&scratch.directory(), &config, event.placement())?;
     let counts = [WARM_UP, COMMANDS].map(|count| settings.count(count));
     let samples = sample_in_child(PATIENCE, |samples| {
         let commanded = command(&scratch.directory(), &config, (event, module.pid()), counts, samples);
@@ -119,24 +115,6 @@ fn turn(settings: &Settings, event: &NotedEvent, has_journal: bool) -> Result<Ve
         return Err(Failure::Failed("the module has ended".into()));
     }
     Ok(samples)
-}
-
-/// The module: this program again.
-fn start_module(scratch: &Path, config: &Path, placement: Placement) -> Result<Child, Failure> {
-    Child::start(|| {
-        settle(End::Pong, placement, Scheduling::Fifo)?;
-        let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
-        let error = Command::new(own)
-            .arg("--config")
-            .arg(config)
-            .args(["--name", "motor.0"])
-            .env(ROLE, "")
-            .env("ROHRPOST_DIR", scratch)
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .exec();
-        Err(Failure::of("a module", error))
-    })
 }
 
 /// Gives a module, which is that process, its commands, one after the other.
@@ -200,41 +178,4 @@ fn await_node(path: &Path) -> Done<Arc<Node>> {
 fn path_in(base: &Path, installation: &Installation) -> PathBuf {
     let file = node_directory(&installation.name, NODE);
     base.join(file.file_name().unwrap_or_default())
-}
-
-/// If this process was started as the module: runs it until it is killed.
-pub(in crate::cases) fn run_hidden_module() -> Option<Result<(), Failure>> {
-    std::env::var_os(ROLE)?;
-    let ended = Start::from_environment().and_then(run_started::<CommandedMotor>);
-    Some(ended.map_err(|error| Failure::of("the module", error)))
-}
-
-/// Does nothing else.
-struct CommandedMotor {
-    speed_m_s: f64,
-}
-
-impl Module for CommandedMotor {
-    type Settings = NoSettings;
-    type Interfaces = MotorInterface;
-
-    fn new(_: NoSettings, _: &mut Context) -> Result<Self, ModuleError> {
-        Ok(Self { speed_m_s: 0.0 })
-    }
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NoSettings {}
-
-impl Motor for CommandedMotor {
-    fn drive(&mut self, speed_m_s: f64, _: f64) -> Result<(), DriveError> {
-        self.speed_m_s = speed_m_s;
-        Ok(())
-    }
-
-    fn halt(&mut self) -> Result<(), DriveError> {
-        self.speed_m_s = 0.0;
-        Ok(())
-    }
 }

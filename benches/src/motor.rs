@@ -1,0 +1,71 @@
+//! A module that does nothing but answer: what commands are measured with. It is this program again, in a process of its
+//! own.
+
+use crate::harness::{Child, End, Failure, Placement, Scheduling, settle};
+use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface};
+use rohrpost_modules::runtime::{Context, Start, run_started};
+use rohrpost_modules::{Module, ModuleError};
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Set for the hidden program that is the module.
+const ROLE: &str = "ROHRPOST_BENCH_MODULE";
+
+/// Starts it as `motor.0` of a configuration; nodes lie in `folder`.
+///
+/// # Errors
+/// When there can be no further process.
+pub fn start_motor(folder: &Path, config: &Path, placement: Placement) -> Result<Child, Failure> {
+    Child::start(|| {
+        settle(End::Pong, placement, Scheduling::Fifo)?;
+        let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+        let error = Command::new(own)
+            .arg("--config")
+            .arg(config)
+            .args(["--name", "motor.0"])
+            .env(ROLE, "")
+            .env("ROHRPOST_DIR", folder)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .exec();
+        Err(Failure::of("a module", error))
+    })
+}
+
+/// If this process was started as the module: runs it until it is killed.
+pub(crate) fn run_hidden_module() -> Option<Result<(), Failure>> {
+    std::env::var_os(ROLE)?;
+    let ended = Start::from_environment().and_then(run_started::<CommandedMotor>);
+    Some(ended.map_err(|error| Failure::of("the module", error)))
+}
+
+/// Does nothing else.
+struct CommandedMotor {
+    speed_m_s: f64,
+}
+
+impl Module for CommandedMotor {
+    type Settings = NoSettings;
+    type Interfaces = MotorInterface;
+
+    fn new(_: NoSettings, _: &mut Context) -> Result<Self, ModuleError> {
+        Ok(Self { speed_m_s: 0.0 })
+    }
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NoSettings {}
+
+impl Motor for CommandedMotor {
+    fn drive(&mut self, speed_m_s: f64, _: f64) -> Result<(), DriveError> {
+        self.speed_m_s = speed_m_s;
+        Ok(())
+    }
+
+    fn halt(&mut self) -> Result<(), DriveError> {
+        self.speed_m_s = 0.0;
+        Ok(())
+    }
+}
