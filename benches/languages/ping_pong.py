@@ -8,6 +8,8 @@ import sys
 import time
 
 STOP = 2**64 - 1
+# Before a turn begins, where ends must find each other first.
+GREETING = STOP - 1
 # As the bench's own turns: with fewer samples a turn goes on after its cap.
 SAMPLES_MIN = 50
 
@@ -66,7 +68,7 @@ class Ping:
 
     def __init__(self, turn):
         self._turn, self._number, self._watch = turn, 0, Stopwatch(turn)
-        self._message, self._sent_ns = b"", 0
+        self._message, self._sent_ns, self.is_done = b"", 0, False
 
     def first(self):
         """The first message."""
@@ -88,8 +90,6 @@ class Ping:
         self._sent_ns = time.monotonic_ns()
         return self._message
 
-    is_done = False
-
     def save(self):
         """Hands the round trips to the bench."""
         self._watch.save()
@@ -108,6 +108,10 @@ class Pong:
         if number not in (self._expected, STOP):
             raise ValueError(f"message {number} came when {self._expected} was due")
         self._expected += 1
+        return message
+
+    def save(self):
+        """It measures nothing."""
 
 
 def play(turn, send, receive):
@@ -121,8 +125,7 @@ def play(turn, send, receive):
         return
     pong = Pong()
     while True:
-        message = receive()
-        pong.came(message)
+        message = pong.came(receive())
         if pong.is_done:
             return
         send(message)

@@ -28,6 +28,8 @@ pub mod one_way;
 pub mod ours;
 #[cfg(feature = "peers")]
 pub mod peers;
+#[cfg(feature = "languages")]
+pub mod player;
 pub mod report;
 pub mod rounds;
 pub mod settings;

@@ -9,13 +9,18 @@ use serde_json::{Map, Value};
 use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
 
 /// Case and contender; what the last one says when it could not run here is reported by `rows`.
-const ROWS: [(&str, &str); 10] = [
+const ROWS: [(&str, &str); 15] = [
     ("C, blocking", "C"),
     ("C, blocking", "Rust"),
     ("C, spinning", "C"),
     ("C, spinning", "Rust"),
-    ("Python", "iceoryx2"),
-    ("Python", "zenoh"),
+    ("Python, data", "Python"),
+    ("Python, data", "Rust"),
+    ("Python, data", "iceoryx2"),
+    ("Python, data", "zenoh"),
+    ("Python, picture", "Python"),
+    ("Python, call", "Python"),
+    ("Python, call", "Rust"),
     ("Python, remote call", "Python"),
     ("Python, remote call", "sockets + hop"),
     ("Python, remote call", "sockets"),

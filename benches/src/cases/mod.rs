@@ -36,6 +36,10 @@ pub fn run_hidden_program() -> Option<Result<(), Failure>> {
     if let Some(done) = crate::motor::run_hidden_module() {
         return Some(done);
     }
+    #[cfg(feature = "languages")]
+    if let Some(done) = crate::player::run_hidden_module() {
+        return Some(done);
+    }
     startup::run_hidden_program()
 }
 

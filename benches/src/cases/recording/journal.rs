@@ -7,18 +7,13 @@ use super::super::case::{Done, as_failure};
 use crate::harness::{
     End, Failure, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
 };
-use crate::motor::start_motor;
+use crate::motor::{MOTOR, reach_motor, start_motor};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
-use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, StreamId, node_directory};
-use rohrpost_modules::call::Caller;
-use rohrpost_modules::interface::Proxy;
-use rohrpost_modules::interfaces::MotorProxy;
+use rohrpost_mailbox::{Node, StreamId};
 use rohrpost_modules::journal::JOURNAL_NUMBER;
-use rohrpost_modules::runtime::ToolLink;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -27,14 +22,7 @@ const COMMANDS: usize = 10_000;
 const WARM_UP: usize = 1_000;
 /// Before a command to a module on the other processor, which goes to sleep meanwhile.
 const PAUSE: Duration = Duration::from_micros(100);
-/// A module starts in milliseconds.
-const READY_WITHIN: Duration = Duration::from_secs(20);
-const LOOK_EACH: Duration = Duration::from_millis(2);
-/// No command waits longer for its answer.
-const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 const PATIENCE: Duration = Duration::from_secs(120);
-const MOTOR: Name = Name::new(1, 200, 0, 0);
-const NODE: &str = "main";
 const CONFIGURATION: &str = r#"
 installation = "bench"
 [system]
@@ -126,17 +114,7 @@ fn command(
     samples: &Samples,
 ) -> Done<Arc<Node>> {
     settle(End::Ping, event.placement(), Scheduling::Fifo)?;
-    let installation = Installation::load(config)?;
-    let node = await_node(&path_in(scratch, &installation))?;
-    let tool = ToolLink::join(&installation, &node, NODE, ANSWER_WITHIN)?;
-    let motor = MotorProxy::new(&Caller::from(tool.link), MOTOR).with_timeout(ANSWER_WITHIN);
-    let deadline = Instant::now() + READY_WITHIN;
-    while let Err(error) = motor.halt() {
-        if Instant::now() > deadline {
-            return Err(error.into());
-        }
-        std::thread::sleep(LOOK_EACH);
-    }
+    let (node, motor) = reach_motor(scratch, config)?;
     for _ in 0..warm_up {
         event.before_each();
         motor.drive(0.5, 0.25)?;
@@ -160,22 +138,4 @@ fn check(node: &Node, has_journal: bool) -> Done<()> {
         None if !has_journal => Ok(()),
         written => Err(format!("records of the journal: {written:?}").into()),
     }
-}
-
-/// The module makes its node.
-fn await_node(path: &Path) -> Done<Arc<Node>> {
-    let deadline = Instant::now() + READY_WITHIN;
-    loop {
-        match Node::open(path) {
-            Ok(node) => return Ok(node),
-            Err(error) if Instant::now() > deadline => return Err(error.into()),
-            Err(_) => std::thread::sleep(LOOK_EACH),
-        }
-    }
-}
-
-/// Where the node lies when `ROHRPOST_DIR` is `base`.
-fn path_in(base: &Path, installation: &Installation) -> PathBuf {
-    let file = node_directory(&installation.name, NODE);
-    base.join(file.file_name().unwrap_or_default())
 }
