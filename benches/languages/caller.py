@@ -6,7 +6,7 @@ import time
 
 import rohrpost as rp
 
-from ping_pong import Stopwatch, Turn
+from ping_pong import Stopwatch, Turn, ends_when_it_fails
 
 turn = Turn()
 
@@ -15,6 +15,7 @@ class Caller(rp.Module, klass="caller"):
     """Calls."""
 
     @rp.every(0.01)
+    @ends_when_it_fails
     def play(self) -> None:
         motor = self.proxy("motor.0")
         give_up = time.monotonic() + 20

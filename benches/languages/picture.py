@@ -6,7 +6,7 @@ import time
 
 import rohrpost as rp
 
-from ping_pong import Turn
+from ping_pong import Turn, ends_when_it_fails
 from pictures import Pictures
 
 turn = Turn()
@@ -26,6 +26,7 @@ class Camera(rp.Module, klass="camera"):
         """What it sees."""
 
     @rp.every(0.001)
+    @ends_when_it_fails
     def see(self) -> None:
         line = pictures.line_of(self.number)
         with self.begin("image", self.picture, pictures.bytes) as pixels:
@@ -42,6 +43,7 @@ class Looker(rp.Module, klass="looker"):
         self.images, self.last = None, -1
 
     @rp.every(0.002)
+    @ends_when_it_fails
     def look(self) -> None:
         if self.images is None:
             try:

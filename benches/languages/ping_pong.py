@@ -4,8 +4,11 @@ Arguments of each program: ``ping`` or ``pong``, bytes, messages, warm-up, cap (
 """
 
 import array
+import functools
+import os
 import sys
 import time
+import traceback
 
 STOP = 2**64 - 1
 # Before a turn begins, where ends must find each other first.
@@ -56,6 +59,20 @@ class Stopwatch:
             self._round_trips.byteswap()
         with open(self._turn.samples, "wb") as file:
             self._round_trips.tofile(file)
+
+
+def ends_when_it_fails(function):
+    """For functions of modules: a module in error goes on, and the bench would wait for it."""
+
+    @functools.wraps(function)
+    def run(*arguments):
+        try:
+            return function(*arguments)
+        except BaseException:
+            traceback.print_exc(file=sys.__stderr__)
+            os._exit(1)
+
+    return run
 
 
 def message_of(number, count):

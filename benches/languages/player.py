@@ -5,7 +5,7 @@ import signal
 
 import rohrpost as rp
 
-from ping_pong import GREETING, Ping, Pong, Turn, message_of
+from ping_pong import GREETING, Ping, Pong, Turn, ends_when_it_fails, message_of
 
 turn = Turn()
 own, other = ("player.0", "player.1") if turn.is_ping else ("player.1", "player.0")
@@ -24,12 +24,14 @@ class Player(rp.Module, klass="player"):
         return b""
 
     @rp.every(0.02)
+    @ends_when_it_fails
     def greet(self) -> None:
         # Subscriptions take a moment.
         if turn.is_ping and not self.has_begun:
             self.publish("ball", greeting)
 
     @rp.on_data(other, "ball")
+    @ends_when_it_fails
     def came(self, ball: bytes) -> None:
         if ball == greeting:
             if not turn.is_ping:

@@ -7,6 +7,7 @@ use nix::sys::signal::{Signal, raise};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_modules::runtime::{Context, Rate, Received, Start, Subscription, run_started};
 use rohrpost_modules::{Module, ModuleError};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -68,7 +69,7 @@ fn run(arguments: &[String]) -> Result<(), Failure> {
 }
 
 /// Plays.
-#[rohrpost_modules::interface(class = "player")]
+#[rohrpost_modules::interface(class = "player", crate = rohrpost_modules::macro_support)]
 trait Player {
     /// What is thrown.
     #[data(1)]
@@ -96,7 +97,7 @@ impl Module for BallPlayer {
     type Interfaces = PlayerInterface;
 
     fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
-        let turn = TURN.get().ok_or_else(|| ModuleError::from("it is not told what to play"))?;
+        let turn = TURN.get().ok_or_else(|| Failure::Failed("it is not told what to play".into()))?;
         let other = if turn.is_ping { "player.1" } else { "player.0" };
         let balls = context.subscribe(PlayerInterface::BALL, other, Rate::Each)?;
         if turn.is_ping {
@@ -118,9 +119,17 @@ impl Module for BallPlayer {
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
         let Some(ball) = data.read(&self.balls)? else { return Ok(()) };
-        if self.turn.is_ping { self.back(context, &ball) } else { self.echo(context, &ball) }
+        let played = if self.turn.is_ping { self.back(context, &ball) } else { self.echo(context, &ball) };
+        // A module in error goes on, and the bench would wait for it.
+        if let Err(error) = &played {
+            let _ = writeln!(std::io::stderr(), "{error}");
+            std::process::exit(1);
+        }
+        played
     }
 }
+
+impl Player for BallPlayer {}
 
 impl BallPlayer {
     fn throw(&mut self, context: &mut Context, number: u64) -> Result<(), ModuleError> {
@@ -160,7 +169,7 @@ impl BallPlayer {
             Some(STOP) => return Ok(raise(Signal::SIGTERM)?),
             Some(GREETING) => {}
             Some(number) if number == self.number => self.number += 1,
-            number => return Err(format!("ball {number:?} came when {} was due", self.number).into()),
+            number => return Err(Failure::Failed(format!("ball {number:?} came when {} was due", self.number)).into()),
         }
         Ok(context.publish_now(PlayerInterface::BALL, ball)?)
     }
