@@ -31,7 +31,7 @@ const DOUBLED: [(&str, &str); 6] = [
 ];
 
 /// Our tools, or crates that only tools need.
-const NOT_FOR_MODULES: [&str; 12] = [
+const NOT_FOR_MODULES: [&str; 13] = [
     "clap",
     "comfy-table",
     "flate2",
@@ -41,6 +41,7 @@ const NOT_FOR_MODULES: [&str; 12] = [
     "rcgen",
     "rerun",
     "rohrpost-bench",
+    "rohrpost-native",
     "rohrpost-recording",
     "rustls",
     "serde_json",

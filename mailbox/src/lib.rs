@@ -155,9 +155,9 @@ pub use send_error::SendError;
 pub use sender::{Loan, Sender};
 pub use slots::SLOTS_MAX;
 pub use stream::{
-    Around, HeldRecord, Missed, Next, OpenRecord, OriginRecord, RecordInfo, ReplicaError, ReplicaWriter,
+    Around, HeldRecord, Missed, Next, OpenRecord, OriginRecord, RecordInfo, RecordPlace, ReplicaError, ReplicaWriter,
     STREAM_KEEP_MAX, STREAM_READERS_MAX, STREAM_SEQUENCE_MAX, Stamp, StreamError, StreamId, StreamInfo, StreamReader,
-    StreamShape, StreamShapeError, StreamWriter, WriteError,
+    StreamShape, StreamShapeError, StreamWriter, SuspendedRecord, WriteError,
 };
 pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
 pub use throttle::Throttle;

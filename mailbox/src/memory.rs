@@ -167,7 +167,7 @@ pub(crate) struct Rooms {
     first: NonNull<u8>,
     bytes_each: usize,
     count: usize,
-    _mapping: Mapping,
+    mapping: Mapping,
 }
 
 // SAFETY: as of `Mapping`: bodies come as raw pointers.
@@ -187,6 +187,11 @@ impl Rooms {
         unsafe { self.first.add(number * self.bytes_each) }
     }
 
+    /// What they are in.
+    pub(crate) fn mapping(&self) -> &Mapping {
+        &self.mapping
+    }
+
     /// Where they begin: an address to prefetch from, also when there is no room.
     #[inline]
     pub(crate) fn first(&self) -> *const u8 {
@@ -204,7 +209,7 @@ impl Mapping {
     /// Panics as [`Mapping::at`] does.
     pub(crate) fn rooms(&self, offset: usize, bytes_each: usize, count: usize) -> Rooms {
         let first = self.bytes_at(offset, bytes_each * count);
-        Rooms { first, bytes_each, count, _mapping: self.clone() }
+        Rooms { first, bytes_each, count, mapping: self.clone() }
     }
 }
 

@@ -24,6 +24,7 @@ pub mod launch;
 pub mod launcher;
 #[doc(hidden)]
 pub mod macro_support;
+mod made;
 mod module;
 pub mod output;
 pub mod parameter;
@@ -36,6 +37,7 @@ pub mod survey;
 pub mod types;
 pub mod wire;
 
+pub use made::{CommandFailure, MadeModule};
 pub use module::{Module, ModuleError};
 pub use rohrpost_fusion as fusion;
 pub use rohrpost_macros::{choice, data, interface, parameters};

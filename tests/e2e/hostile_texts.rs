@@ -90,8 +90,8 @@ impl Serve<Hostile> for HostileInterface {
 struct Parameters(Vec<u8>);
 
 impl ParameterSet for Parameters {
-    fn names(&self) -> &'static [&'static str] {
-        &[HOSTILE]
+    fn names(&self) -> Vec<&str> {
+        vec![HOSTILE]
     }
 
     fn get(&self, index: usize) -> Option<Parameter> {

@@ -12,6 +12,7 @@ mod bench;
 mod beyond;
 mod beyond_strangers;
 mod boot;
+mod c_modules;
 mod check;
 mod completions;
 mod conforming;

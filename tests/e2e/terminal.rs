@@ -41,17 +41,21 @@ const fn size(rows: u16, columns: u16) -> Winsize {
     Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 }
 }
 
+/// Both ends of a new pseudo-terminal, and the path of the second.
+pub(crate) fn open_pair() -> (File, File, String) {
+    // Not by `openpty`: processes of other tests would inherit its files and keep them open.
+    let master = posix_openpt(OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC).unwrap();
+    grantpt(&master).unwrap();
+    unlockpt(&master).unwrap();
+    let (path, no_session) = (ptsname_r(&master).unwrap(), nix::libc::O_NOCTTY);
+    let slave = File::options().read(true).write(true).custom_flags(no_session).open(&path).unwrap();
+    (File::from(OwnedFd::from(master)), slave, path)
+}
+
 impl Terminal {
     /// Starts a command in it.
     pub(crate) fn start(place: &Place, arguments: &[&str], rows: u16, columns: u16) -> (Self, Running) {
-        // Not by `openpty`: processes of other tests would inherit its files and keep them open.
-        let master = posix_openpt(OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC).unwrap();
-        grantpt(&master).unwrap();
-        unlockpt(&master).unwrap();
-        let no_session = nix::libc::O_NOCTTY;
-        let slave = File::options().read(true).write(true).custom_flags(no_session).open(ptsname_r(&master).unwrap());
-        let slave = slave.unwrap();
-        let master = File::from(OwnedFd::from(master));
+        let (master, slave, _) = open_pair();
         // SAFETY: the file is open, and the size lives for the call.
         unsafe { set_size(master.as_raw_fd(), &size(rows, columns)) }.unwrap();
         let mut command = place.command(arguments);

@@ -4,6 +4,7 @@
 //! anything else, and that should take a second.
 #![forbid(unsafe_code)]
 
+mod c_client;
 mod cargo;
 mod checks;
 mod demo;
@@ -36,6 +37,8 @@ cargo xtask instructions [--record]
     Counts instructions of the hot paths with callgrind and compares them with recorded ceilings, or records these.
 cargo xtask tsan
     Runs the mailbox's slot core, and broken variants of it, under ThreadSanitizer.
+cargo xtask c-client DIR
+    Builds the library for C and C++, and installs it with its headers and pkg-config file below DIR.
 cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]
     A picture of a drawing as its viewer shows it, without a screen.
 ";
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
         "fuzz" => fuzz::run(rest),
         "instructions" => instructions::command(rest),
         "tsan" => tsan::run(),
+        "c-client" => c_client::install(rest),
         "picture" => picture::run(rest),
         "help" | "--help" | "-h" => {
             print!("{HELP}");

@@ -5,6 +5,7 @@ use crate::owned::BadSegment;
 use crate::participant::Participant;
 use crate::step::step;
 use crate::stream::error::StreamError;
+use crate::stream::place::RecordPlace;
 use crate::stream::ring::{Line, Ring, Stamp};
 use crate::stream::segment::{StreamSegment, path_of};
 use crate::stream::shape::StreamId;
@@ -155,6 +156,18 @@ impl HeldRecord<'_> {
     /// What is said of it.
     pub fn info(&self) -> RecordInfo {
         self.place.info(&self.line)
+    }
+
+    /// Where its bytes are.
+    pub fn at(&self) -> RecordPlace {
+        let Line { frame, .. } = self.line;
+        self.place.segment.place_of(frame, self.place.segment.len(&self.line))
+    }
+
+    /// Stays held until its reader takes another record, or is dropped; where its bytes are.
+    pub fn stay(mut self) -> RecordPlace {
+        self.is_kept = true;
+        self.at()
     }
 }
 

@@ -7,6 +7,7 @@ use crate::name::Name;
 use crate::owned::{BadFile, BadSegment, Owned};
 use crate::step::step;
 use crate::stream::bytes;
+use crate::stream::place::RecordPlace;
 use crate::stream::ring::{IndexEntry, Line, Ring, Seat};
 use crate::stream::shape::{StreamId, StreamIdentity, StreamPage, StreamShape};
 use crate::stream::writing::{Frame, Progress};
@@ -162,6 +163,11 @@ impl StreamSegment {
         // borrowed, and named by no entry and no seat (`Progress::claim`): nothing else reaches these bytes, since
         // records of this size are only read held (`copy`).
         unsafe { std::slice::from_raw_parts_mut(body.as_ptr(), self.shape.record_bytes as usize) }
+    }
+
+    /// Where [`StreamSegment::body_mut`] has so many bytes.
+    pub(crate) fn place_of(&self, frame: usize, len: usize) -> RecordPlace {
+        RecordPlace::new(self.frames.room(frame), len.min(self.shape.record_bytes as usize), self.frames.mapping())
     }
 
     // ---- readers ----

@@ -10,6 +10,7 @@ use crate::participant::Participant;
 use crate::step::step;
 use crate::stream::error::{StreamError, WriteError};
 use crate::stream::omission::LeftOut;
+use crate::stream::place::RecordPlace;
 use crate::stream::record::RecordInfo;
 use crate::stream::ring::{About, Line, Seat, Stamp};
 use crate::stream::segment::StreamSegment;
@@ -147,6 +148,12 @@ impl StreamWriter {
         Ok(OpenRecord { open: Some((self, frame)), stamp })
     }
 
+    /// Takes up a record of this stream that was suspended. Until then no other one can be begun.
+    pub fn resume(&mut self, suspended: SuspendedRecord) -> OpenRecord<'_> {
+        let SuspendedRecord { frame, stamp } = suspended;
+        OpenRecord { open: Some((self, frame)), stamp }
+    }
+
     /// The record that was written last, by this writer or one before it; none before the first. Only the writer could
     /// put another in its place, and it is borrowed.
     ///
@@ -222,6 +229,13 @@ fn wake(participant: &Participant, seat: &Seat, sleeper: u64) {
     }
 }
 
+/// A record that is being filled, and does not keep its writer meanwhile.
+#[must_use = "its place is lost to this writer unless it is taken up again"]
+pub struct SuspendedRecord {
+    frame: Frame,
+    stamp: Stamp,
+}
+
 /// A record that is being filled in place; readers do not see it. Dropped, nothing happened.
 pub struct OpenRecord<'a> {
     /// None once it is finished.
@@ -234,6 +248,22 @@ impl<'a> OpenRecord<'a> {
     pub fn body_mut(&mut self) -> &mut [u8] {
         let Some((writer, frame)) = &mut self.open else { return &mut [] };
         if writer.segment.shape.is_racing() { &mut writer.draft } else { writer.segment.body_mut(frame) }
+    }
+
+    /// Where the bytes to fill are in the stream's memory; none of a stream with small records, which are filled
+    /// elsewhere.
+    pub fn at(&self) -> Option<RecordPlace> {
+        let (writer, frame) = self.open.as_ref()?;
+        let shape = &writer.segment.shape;
+        let place = || writer.segment.place_of(frame.number(), shape.record_bytes as usize);
+        (!shape.is_racing()).then(place)
+    }
+
+    /// Lets go of the writer, to be [taken up](StreamWriter::resume) later: what is in it stays.
+    pub fn suspend(mut self) -> SuspendedRecord {
+        // There from `begin` on until here.
+        let Some((_, frame)) = self.open.take() else { unreachable!("it is suspended once") };
+        SuspendedRecord { frame, stamp: self.stamp }
     }
 
     /// Makes the first `len` bytes the next record; its sequence.

@@ -181,8 +181,8 @@ fn parameter_set(owner: &Ident, krate: &TokenStream, parameters: &[Parameter]) -
         }
 
         impl #krate::ParameterSet for #owner {
-            fn names(&self) -> &'static [&'static str] {
-                &[#(#names),*]
+            fn names(&self) -> ::std::vec::Vec<&str> {
+                ::std::vec![#(#names),*]
             }
 
             fn get(&self, index: usize) -> ::std::option::Option<#krate::Parameter> {

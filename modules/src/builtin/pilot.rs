@@ -25,7 +25,7 @@ pub(super) struct Settings {
 }
 
 impl settings::Settings for Settings {
-    fn parameters(&self) -> &'static [&'static str] {
+    fn parameters(&self) -> Vec<&str> {
         self.names()
     }
 

@@ -16,8 +16,8 @@ pub(super) trait Settings: DeserializeOwned {
     }
 
     /// Those that may change while it runs.
-    fn parameters(&self) -> &'static [&'static str] {
-        &[]
+    fn parameters(&self) -> Vec<&str> {
+        Vec::new()
     }
 
     /// Records that it writes, of the streams that may need larger ones than the default.
@@ -68,7 +68,7 @@ pub(super) fn saved<M: Module<Settings: Settings>>(
 ) -> Option<SettingsError> {
     let saved = installation.saved.as_ref()?;
     let settings: M::Settings = installation.settings_without_saved(module).ok()?;
-    let names = saved.check_names(installation, module, settings.parameters());
+    let names = saved.check_names(installation, module, &settings.parameters());
     names.and_then(|()| installation.settings_as::<M::Settings>(module).map(drop)).err()
 }
 

@@ -65,7 +65,7 @@ impl Default for Settings {
 }
 
 impl settings::Settings for Settings {
-    fn parameters(&self) -> &'static [&'static str] {
+    fn parameters(&self) -> Vec<&str> {
         self.names()
     }
 

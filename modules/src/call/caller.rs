@@ -64,17 +64,60 @@ impl Caller {
         &self,
         to: Name,
         function: u16,
-        (interface, description): (u32, fn() -> Description),
+        interface: (u32, fn() -> Description),
         timeout: Duration,
         arguments: &A,
     ) -> Result<u32, CallError> {
+        self.begin_with(to, function, interface, timeout, |body| append(body, arguments))
+    }
+
+    /// The same with arguments that are postcard already, one after the other, of an interface that is known by its
+    /// hash and description; [`Caller::wait_bytes`] fetches the answer.
+    ///
+    /// ```
+    /// # use rohrpost_mailbox::Name;
+    /// use rohrpost_modules::{call::{CallError, Caller}, schema::Description};
+    ///
+    /// type Bytes = Vec<u8>;
+    ///
+    /// fn call(link: &Caller, to: Name, its: &Description, number: u16, arguments: &[u8]) -> Result<Bytes, CallError> {
+    ///     let within = std::time::Duration::from_secs(1);
+    ///     let sequence = link.begin_bytes(to, number, (its.hash(), its), within, arguments)?;
+    ///     link.wait_bytes(sequence, to)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn begin_bytes(
+        &self,
+        to: Name,
+        function: u16,
+        (interface, description): (u32, &Description),
+        timeout: Duration,
+        arguments: &[u8],
+    ) -> Result<u32, CallError> {
+        self.begin_with(to, function, (interface, || description.clone()), timeout, |body| {
+            body.extend_from_slice(arguments);
+            Ok(())
+        })
+    }
+
+    fn begin_with(
+        &self,
+        to: Name,
+        function: u16,
+        (interface, description): (u32, impl FnOnce() -> Description),
+        timeout: Duration,
+        arguments: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
+    ) -> Result<u32, CallError> {
         let SharedLink { link, journal, arguments: bytes } = &*self.0;
         if journal.is_none() {
-            return link.borrow_mut().begin(to, function, interface, timeout, |body| append(body, arguments));
+            return link.borrow_mut().begin(to, function, interface, timeout, arguments);
         }
         let mut bytes = bytes.borrow_mut();
         bytes.clear();
-        append(&mut bytes, arguments).map_err(|error| CallError::BadArguments(error.to_string()))?;
+        arguments(&mut bytes).map_err(|error| CallError::BadArguments(error.to_string()))?;
         journal.replay(|replay| replay.know_called(interface, description));
         let timeout_ns = nanoseconds(timeout);
         let arguments = NotedValue::of(&bytes);
@@ -91,20 +134,35 @@ impl Caller {
 
     /// Waits for the result of a call to this module.
     pub(crate) fn wait<T: DeserializeOwned>(&self, sequence: u32, to: Name) -> Result<T, CallError> {
+        self.wait_for(sequence, to, |bytes| postcard::from_bytes(bytes))
+    }
+
+    /// The same, in postcard; nobody looks whether it is what the interface says.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn wait_bytes(&self, sequence: u32, to: Name) -> Result<Vec<u8>, CallError> {
+        self.wait_for(sequence, to, |bytes| Ok(bytes.to_vec()))
+    }
+
+    fn wait_for<T>(
+        &self,
+        sequence: u32,
+        to: Name,
+        decode: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,
+    ) -> Result<T, CallError> {
         let SharedLink { link, journal, .. } = &*self.0;
         let question = Question::Call { to: to.raw(), sequence };
         if let Some(given) = journal.given(Tag::Answered, question) {
             let answer: Result<Blob<'_>, NotedCallError> = given.read();
-            let read = |bytes: Blob<'_>| {
-                postcard::from_bytes(bytes.0).map_err(|error| CallError::BadReply(to, error.to_string()))
-            };
+            let read = |bytes: Blob<'_>| decode(bytes.0).map_err(|error| CallError::BadReply(to, error.to_string()));
             return answer.map_err(CallError::from).and_then(read);
         }
         let mut is_noted = journal.is_none();
         let read = |bytes: &[u8]| {
             journal.note(Tag::Answered, question, &Ok::<_, NotedCallError>(Blob(bytes)));
             is_noted = true;
-            postcard::from_bytes(bytes)
+            decode(bytes)
         };
         let result = link.borrow_mut().wait(sequence, read);
         match result {

@@ -15,7 +15,7 @@ pub(super) struct KnownTypes {
     /// Its own interfaces, under each of its names.
     pub(super) own: Vec<Option<Description>>,
     /// Those that it calls, by their hashes.
-    pub(super) called: Vec<(u32, fn() -> Description)>,
+    pub(super) called: Vec<(u32, Description)>,
 }
 
 /// How a journal begins: with all that the module was given at its start.
@@ -109,8 +109,8 @@ fn published(its: &NotedItem<'_>, known: &KnownTypes) -> String {
 }
 
 fn called(its: &NotedCommand<'_>, known: &KnownTypes) -> String {
-    let interface = known.called.iter().find(|(hash, _)| *hash == its.interface).map(|(_, description)| description());
-    let functions = interface.map(|interface| interface.functions).unwrap_or_default();
+    let interface = known.called.iter().find(|(hash, _)| *hash == its.interface).map(|(_, description)| description);
+    let functions = interface.map_or(&[][..], |interface| &interface.functions);
     let function = functions.iter().find(|function| function.number == its.function);
     let arguments = its.arguments.shown(|bytes| {
         let types = function?.arguments.iter().map(|field| field.ty.clone()).collect();

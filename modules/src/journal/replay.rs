@@ -84,9 +84,9 @@ impl JournalReplay {
     }
 
     /// An interface that it calls.
-    pub(crate) fn know_called(&mut self, hash: u32, description: fn() -> Description) {
+    pub(crate) fn know_called(&mut self, hash: u32, description: impl FnOnce() -> Description) {
         if !self.known.called.iter().any(|(known, _)| *known == hash) {
-            self.known.called.push((hash, description));
+            self.known.called.push((hash, description()));
         }
     }
 

@@ -57,7 +57,7 @@ use serde::{Deserialize, Serialize};
 /// The parameters of a module and their present values. Written by [`crate::parameters`] for the settings struct.
 pub trait ParameterSet {
     /// Their names, as the configuration has them.
-    fn names(&self) -> &'static [&'static str];
+    fn names(&self) -> Vec<&str>;
 
     /// One of them with its present value; none past the last.
     fn get(&self, index: usize) -> Option<Parameter>;

@@ -263,6 +263,24 @@ impl Context {
         Ok(P::new(&self.link, self.named(module, P::CLASS)?))
     }
 
+    /// A module that this one sends commands to or subscribes to, by the text of a setting: for programs that know its
+    /// interface by a description alone.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError};
+    /// fn motor(context: &Context) -> Result<rohrpost_mailbox::Name, ContextError> {
+    ///     context.callee("motor.0")
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// When the text names no module.
+    pub fn callee(&self, module: &str) -> Result<Name, ContextError> {
+        let (name, is_beyond) = self.parsed(module)?;
+        self.warn_undeclared(module, name, is_beyond);
+        Ok(name)
+    }
+
     /// The link that proxies are made of.
     ///
     /// ```
@@ -278,6 +296,11 @@ impl Context {
     /// A module that this one sends commands to.
     fn named(&self, module: &str, wanted: &'static str) -> Result<Name, ContextError> {
         let (name, is_beyond) = self.of_class(module, wanted)?;
+        self.warn_undeclared(module, name, is_beyond);
+        Ok(name)
+    }
+
+    fn warn_undeclared(&self, module: &str, name: Name, is_beyond: bool) {
         // The configuration counts on `calls`: the number of callers decides how many slots a mailbox needs.
         let declared = is_beyond || self.installation.module(self.me).is_none_or(|me| me.calls.contains(&name));
         if !declared {
@@ -285,19 +308,23 @@ impl Context {
                 "it calls {module}, which its `calls` does not name; add it, so that `check` can count on it"
             );
         }
-        Ok(name)
     }
 
     /// A module of this class, and whether it is beyond the LAN.
     fn of_class(&self, module: &str, wanted: &'static str) -> Result<(Name, bool), ContextError> {
-        let classes = &self.installation.classes;
-        // What is beyond the LAN has a name of four parts, and stands in another configuration.
-        let is_beyond = self.installation.tcp.is_some() && module.split('.').count() == 4;
-        let name = if is_beyond { classes.parse_name(module)?.module() } else { classes.parse_module(module)? };
+        let (name, is_beyond) = self.parsed(module)?;
         let class = self.installation.classes.name(name.class()).unwrap_or_default();
         if class != wanted {
             return Err(ContextError::Class { module: module.into(), class: class.into(), wanted });
         }
+        Ok((name, is_beyond))
+    }
+
+    /// A module, and whether it is beyond the LAN: that has a name of four parts, and stands in another configuration.
+    fn parsed(&self, module: &str) -> Result<(Name, bool), ContextError> {
+        let classes = &self.installation.classes;
+        let is_beyond = self.installation.tcp.is_some() && module.split('.').count() == 4;
+        let name = if is_beyond { classes.parse_name(module)?.module() } else { classes.parse_module(module)? };
         Ok((name, is_beyond))
     }
 }

@@ -6,10 +6,10 @@ use super::hosted::Hosted;
 use super::received::Received;
 use super::runner::Running;
 use crate::journal::{JournalEvent, JournalReplay};
-use crate::module::Module;
+use crate::made::MadeModule;
 use rohrpost_mailbox::{Ready, Watch};
 
-impl<M: Module> Running<M> {
+impl<M: MadeModule> Running<M> {
     /// Whether it repeats a journal.
     pub(super) fn is_replayed(&self) -> bool {
         self.context.journal.is_replayed()

@@ -11,7 +11,7 @@ use crate::call::Fault;
 use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};
 use crate::interface::StandInCommand;
 use crate::journal::{Blob, JournalEvent, NotedReply, NotedValue, Tag};
-use crate::module::Module;
+use crate::made::MadeModule;
 use crate::output;
 use crate::publish::RequestOrigin;
 use rohrpost_config::Principal;
@@ -26,7 +26,7 @@ pub(super) struct Hosted<'a, M> {
     pub(super) context: &'a mut Context,
 }
 
-impl<M: Module> CommandHandler for Hosted<'_, M> {
+impl<M: MadeModule> CommandHandler for Hosted<'_, M> {
     fn is_idempotent(&self, number: u16) -> bool {
         number < common::FIRST_OWN || self.offer.idempotent.contains(&number)
     }
@@ -53,7 +53,7 @@ impl<M: Module> CommandHandler for Hosted<'_, M> {
     }
 }
 
-impl<M: Module> Hosted<'_, M> {
+impl<M: MadeModule> Hosted<'_, M> {
     /// Runs a function of the module's own.
     pub(super) fn function(&mut self, number: u16, arguments: &[u8], reply: &mut Vec<u8>) -> Result<(), Fault> {
         let event = JournalEvent::Function { endpoint: self.index as u16, number, arguments: Blob(arguments) };
@@ -62,8 +62,9 @@ impl<M: Module> Hosted<'_, M> {
                 return Err(Fault::Unknown(number));
             }
             let command = StandInCommand { to: self.context.endpoints[self.index], number, arguments };
-            let part = |module: &mut M, context: &mut Context| module.stand_in_command(context, &command, reply);
-            self.life.work(event, self.context, part)
+            let part = |module: &mut M, context: &mut Context| module.command(context, &command, reply);
+            let done = self.life.work(event, self.context, part);
+            done.map_err(|failure| self.life.failure(failure, self.context))
         } else {
             let serve = self.offer.serve.ok_or(Fault::Unknown(number))?;
             let part = |module: &mut M, _: &mut Context| serve(module, number, arguments, reply);

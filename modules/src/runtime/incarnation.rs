@@ -4,7 +4,8 @@ use super::context::Context;
 use crate::call::Fault;
 use crate::common::Status;
 use crate::journal::{JournalEvent, Tag};
-use crate::module::{Module, ModuleError};
+use crate::made::{CommandFailure, MadeModule};
+use crate::module::ModuleError;
 use crate::output;
 use crate::survey::in_words;
 use rohrpost_mailbox::{ModuleState, Participant, Work};
@@ -25,7 +26,7 @@ pub(crate) struct Incarnation<M> {
     busy_after: Duration,
 }
 
-impl<M: Module> Incarnation<M> {
+impl<M: MadeModule> Incarnation<M> {
     pub(crate) fn new(module: M, participant: Arc<Participant>, busy_after: Duration) -> Self {
         let (state, started) = (ModuleState::Starting, Instant::now());
         let mut life = Self { module, changes: 0, participant, state, error: String::new(), started, busy_after };
@@ -109,6 +110,17 @@ impl<M: Module> Incarnation<M> {
         self.error = error.to_string();
         tracing::error!(errno = error.errno(), "{error}");
         self.enter(ModuleState::Error);
+    }
+
+    /// What the caller of a command is told that failed.
+    pub(super) fn failure(&mut self, failure: CommandFailure, context: &mut Context) -> Fault {
+        match failure {
+            CommandFailure::Fault(fault) => fault,
+            CommandFailure::Module(error) => {
+                self.fail(&error, context);
+                Fault::ModuleError(self.error.clone())
+            }
+        }
     }
 
     pub(super) fn check(&mut self, result: Result<(), ModuleError>, context: &mut Context) {

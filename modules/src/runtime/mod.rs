@@ -38,11 +38,13 @@ pub use error::{ContextError, StartError};
 pub use follow::{BadRate, Rate, Subscription};
 pub use host::{ClientError, ToolLink, describe};
 pub use received::Received;
-pub use runner::{exit, run, run_started};
+pub use runner::{exit, run, run_described, run_started};
 pub use server::{read_arguments, write_result};
 pub(crate) use start::environment;
 pub use start::{Start, find_other_versions, find_running, kept};
-pub use stream::{Moment, OpenValue, Record, RecordError, Stream, StreamReadError, StreamSubscription};
+pub use stream::{
+    Moment, OpenValue, Record, RecordError, StayingBytes, Stream, StreamReadError, StreamSubscription, SuspendedValue,
+};
 pub use subscribed::Subscribed;
 pub use time_teller::TimeTeller;
 pub use unreadable::Unreadable;

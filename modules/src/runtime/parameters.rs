@@ -3,12 +3,12 @@
 use super::context::Context;
 use super::error::StartError;
 use crate::common::{Change, PARAMETER_PAGE, ParameterPage, SetParameters};
-use crate::module::Module;
+use crate::made::MadeModule;
 use crate::parameter::{Parameter, ParameterSet, Refusal, value_text};
 use rohrpost_config::Installation;
 
 /// The parameters from an index on, as many as one reply holds.
-pub(crate) fn page<M: Module>(module: &mut M, changes: u32, from: u16) -> ParameterPage {
+pub(crate) fn page<M: MadeModule>(module: &mut M, changes: u32, from: u16) -> ParameterPage {
     let mut page = ParameterPage { total: 0, changes, parameters: Vec::new() };
     let Some(set) = module.parameters() else { return page };
     page.total = u16::try_from(set.names().len()).unwrap_or(u16::MAX);
@@ -32,7 +32,7 @@ struct Wanted {
 }
 
 /// Sets all of them, or none; nothing else of the module runs meanwhile.
-pub(crate) fn set<M: Module>(
+pub(crate) fn set<M: MadeModule>(
     module: &mut M,
     context: &mut Context,
     wish: &SetParameters,
@@ -60,7 +60,7 @@ fn check(set: &dyn ParameterSet, values: &[(String, Vec<u8>)]) -> Result<Vec<Wan
     Ok(wanted)
 }
 
-fn apply<M: Module>(module: &mut M, context: &mut Context, wanted: &[Wanted], by: &str) -> Result<(), Refusal> {
+fn apply<M: MadeModule>(module: &mut M, context: &mut Context, wanted: &[Wanted], by: &str) -> Result<(), Refusal> {
     let changed: Vec<&Wanted> = wanted.iter().filter(|wanted| wanted.old.value != wanted.new).collect();
     if changed.is_empty() {
         return Ok(());
@@ -80,7 +80,7 @@ fn apply<M: Module>(module: &mut M, context: &mut Context, wanted: &[Wanted], by
     Ok(())
 }
 
-fn put<M: Module>(module: &mut M, changed: &[&Wanted], value: impl Fn(&Wanted) -> &Vec<u8>) {
+fn put<M: MadeModule>(module: &mut M, changed: &[&Wanted], value: impl Fn(&Wanted) -> &Vec<u8>) {
     let Some(set) = module.parameters() else { return };
     for wanted in changed {
         set.put(wanted.index, value(wanted));
@@ -89,7 +89,7 @@ fn put<M: Module>(module: &mut M, changed: &[&Wanted], value: impl Fn(&Wanted) -
 
 /// What reading the settings could not see: saved values of what is no parameter, and defaults in code that are out of
 /// range.
-pub(crate) fn check_start<M: Module>(
+pub(crate) fn check_start<M: MadeModule>(
     module: &mut M,
     installation: &Installation,
     config: &rohrpost_config::Module,
@@ -97,7 +97,7 @@ pub(crate) fn check_start<M: Module>(
 ) -> Result<(), StartError> {
     let mut set = module.parameters();
     if let Some(saved) = &installation.saved {
-        saved.check_names(installation, config, set.as_ref().map_or(&[], |set| set.names()))?;
+        saved.check_names(installation, config, &set.as_ref().map_or_else(Vec::new, |set| set.names()))?;
     }
     let Some(set) = set.as_mut() else { return Ok(()) };
     for (index, parameter) in (0..set.names().len()).filter_map(|index| Some((index, set.get(index)?))) {

@@ -5,7 +5,7 @@ use super::subscribed::{Origin, Subscribed};
 use super::unreadable::Unreadable;
 use crate::common::DataHead;
 use crate::journal::{JournalEvent, ModuleJournal, NotedOrigin};
-use rohrpost_mailbox::{Name, Stamp, StreamId, local};
+use rohrpost_mailbox::{HeldRecord, Name, RecordPlace, Stamp, StreamId, local};
 use rohrpost_schema::{Data, View};
 
 /// Data that a subscription brought.
@@ -30,6 +30,8 @@ pub struct Received<'a> {
     /// The value, postcard. That of a stream's record lies in its ring.
     pub value: &'a [u8],
     origin: Origin,
+    /// The record, if it is one in a ring.
+    record: Option<&'a HeldRecord<'a>>,
 }
 
 impl<'a> Received<'a> {
@@ -38,7 +40,18 @@ impl<'a> Received<'a> {
             Origin::Package { mailbox, .. } => mailbox,
             Origin::Stream { .. } => local::COMMANDS,
         };
-        Self { from, number, mailbox, head, value, origin }
+        Self { from, number, mailbox, head, value, origin, record: None }
+    }
+
+    /// The same, of this record.
+    pub(super) fn held(self, record: &'a HeldRecord<'a>) -> Self {
+        Self { record: Some(record), ..self }
+    }
+
+    /// Where the value lies, if it is a stream's record: for programs in other languages that hand out a view of it.
+    /// Once the module has looked, its writer may have the place.
+    pub fn place(&self) -> Option<RecordPlace> {
+        self.record.map(HeldRecord::at)
     }
 
     /// As this journal is to have it.

@@ -7,17 +7,20 @@ use super::hosted::Hosted;
 use super::incarnation::Incarnation;
 use super::received::Received;
 use super::refusals::Cause;
-use super::start::Start;
+use super::start::{ModuleProgram, Start};
 use super::stream::{self, FollowedStream, Step};
 use super::subscribed::Origin;
 use crate::common::DataHead;
-use crate::interface::Interfaces;
+use crate::interface::{Interfaces, StandIn};
 use crate::journal::{JournalEvent, Tag, end_unmade, end_unstarted};
-use crate::module::Module;
+use crate::made::MadeModule;
+use crate::module::{Module, ModuleError};
 use crate::output;
+use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     Kind, ModuleState, OverflowPolicy, Ready, Receiver, Source, Waiting, Watches, monotonic_ns, wait_any,
 };
+use serde::de::DeserializeOwned;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -89,7 +92,28 @@ pub fn exit(result: Result<(), StartError>) -> ExitCode {
 /// # Errors
 /// See [`StartError`].
 pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
-    let joined = catch_unwind(AssertUnwindSafe(|| start.join::<M>()));
+    let (stand_ins, new) = (Box::new(M::stand_ins), Box::new(M::new));
+    run_program(start, ModuleProgram { served: M::Interfaces::table(), stand_ins, new })
+}
+
+/// Runs a module that is described now, since there are no types of it: `described` says what it serves under its
+/// names, and `new` makes it of its settings.
+///
+/// # Errors
+/// See [`StartError`].
+pub fn run_described<M: MadeModule, S: DeserializeOwned>(
+    start: Start,
+    described: impl FnOnce(&S, &Installation) -> Result<Vec<StandIn>, ModuleError>,
+    new: impl FnOnce(S, &mut Context) -> Result<M, ModuleError>,
+) -> Result<(), StartError> {
+    run_program(start, ModuleProgram { served: Vec::new(), stand_ins: Box::new(described), new: Box::new(new) })
+}
+
+fn run_program<M: MadeModule, S: DeserializeOwned>(
+    start: Start,
+    program: ModuleProgram<'_, M, S>,
+) -> Result<(), StartError> {
+    let joined = catch_unwind(AssertUnwindSafe(|| start.join(program)));
     let joined = joined.unwrap_or_else(|panic| {
         end_unmade(Tag::Panicked, text_of(&*panic));
         output::flush();
@@ -136,7 +160,7 @@ pub(crate) struct Running<M> {
     pub(crate) sources: Vec<&'static mut (dyn Source + 'static)>,
 }
 
-impl<M: Module> Running<M> {
+impl<M: MadeModule> Running<M> {
     fn turn_on_if_wanted(&mut self) {
         // It may have been told to end while it was being made.
         if self.turn_on && !self.stop.load(Ordering::Acquire) {
@@ -327,7 +351,7 @@ impl<M: Module> Running<M> {
 }
 
 /// Hands out a burst of packages of one mailbox; false when there was none.
-fn take<M: Module>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &mut Context) -> bool {
+fn take<M: MadeModule>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &mut Context) -> bool {
     let (local, latest) = (mailbox.name().local(), mailbox.shape().full == OverflowPolicy::Latest);
     burst(|| {
         let Some(package) = mailbox.try_receive() else { return false };
@@ -371,9 +395,4 @@ fn empty<'a>(mut sources: Vec<&mut (dyn Source + 'static)>) -> Vec<&'a mut (dyn 
 /// A mailbox, as one of the things that are waited for.
 fn source(mailbox: &mut Receiver) -> &mut (dyn Source + 'static) {
     mailbox
-}
-
-/// What a module serves, in the order of its endpoints.
-pub(crate) fn served<M: Module>() -> Vec<crate::interface::Served<M>> {
-    M::Interfaces::table()
 }

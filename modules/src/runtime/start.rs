@@ -6,12 +6,13 @@ use super::endpoint::{Endpoint, Offered};
 use super::error::StartError;
 use super::incarnation::Incarnation;
 use super::parameters;
-use super::runner::{Running, served};
+use super::runner::Running;
 use super::stream::{self, ServedStreams};
 use crate::call::Link;
-use crate::interface::StandIn;
+use crate::interface::{Served, StandIn};
 use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal};
-use crate::module::{Module, ModuleError};
+use crate::made::MadeModule;
+use crate::module::ModuleError;
 use crate::output;
 use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
@@ -21,6 +22,7 @@ use rohrpost_mailbox::{
     base_directory, local, node_directory, sys,
 };
 use rohrpost_schema::Description;
+use serde::de::DeserializeOwned;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -47,6 +49,16 @@ pub(crate) mod environment {
 pub fn kept() -> Vec<OwnedFd> {
     sys::handed_on()
 }
+
+/// How a module of a program is made: what it serves by types, what by descriptions, and what makes it of its settings.
+pub(super) struct ModuleProgram<'a, M, S> {
+    pub(super) served: Vec<Served<M>>,
+    pub(super) stand_ins: MakeStandIns<'a, S>,
+    pub(super) new: MakeModule<'a, M, S>,
+}
+
+type MakeStandIns<'a, S> = Box<dyn FnOnce(&S, &Installation) -> Result<Vec<StandIn>, ModuleError> + 'a>;
+type MakeModule<'a, M, S> = Box<dyn FnOnce(S, &mut Context) -> Result<M, ModuleError> + 'a>;
 
 /// What to start.
 ///
@@ -115,7 +127,11 @@ impl Start {
     }
 
     /// Joins the node, makes the mailboxes and the module.
-    pub(crate) fn join<M: Module>(self) -> Result<Running<M>, StartError> {
+    pub(super) fn join<M: MadeModule, S: DeserializeOwned>(
+        self,
+        program: ModuleProgram<'_, M, S>,
+    ) -> Result<Running<M>, StartError> {
+        let ModuleProgram { mut served, stand_ins, new } = program;
         let installation = self.installation.clone();
         let text = installation.classes.format(self.name);
         let module = installation.module(self.name).filter(|module| module.name == self.name);
@@ -143,8 +159,7 @@ impl Start {
             })
         };
         let settings = installation.settings_as(module)?;
-        let mut stand_ins = stand_ins::<M>(&settings, &installation, module)?;
-        let mut served = served::<M>();
+        let mut stand_ins = checked(stand_ins(&settings, &installation), &installation, module)?;
         let mut endpoints = Vec::new();
         for name in module.names() {
             let class = installation.classes.name(name.class()).unwrap_or_default().to_owned();
@@ -184,7 +199,7 @@ impl Start {
         });
         journal.event(&JournalEvent::New, || context.clock.unseen().now().ns);
         participant.begin_work(Work::New);
-        let made = M::new(settings, &mut context);
+        let made = new(settings, &mut context);
         participant.end_work();
         let mut made = made.map_err(|error| StartError::Module {
             module: text.clone(),
@@ -227,8 +242,8 @@ impl Start {
 }
 
 /// For what the module stands in: names of its own, each of the class that its description says.
-fn stand_ins<M: Module>(
-    settings: &M::Settings,
+fn checked(
+    stand_ins: Result<Vec<StandIn>, ModuleError>,
     installation: &Installation,
     module: &rohrpost_config::Module,
 ) -> Result<Vec<StandIn>, StartError> {
@@ -238,7 +253,7 @@ fn stand_ins<M: Module>(
         text: error.to_string(),
         errno: error.errno(),
     };
-    let stand_ins = M::stand_ins(settings, installation).map_err(failed)?;
+    let stand_ins = stand_ins.map_err(failed)?;
     for (at, StandIn { name, description }) in stand_ins.iter().enumerate() {
         let why = if !module.names().any(|own| own == *name) {
             "it does not have that name"

@@ -50,6 +50,21 @@ pub(super) fn put_open<T: Serialize>(
     Ok(from..end)
 }
 
+/// The same of a value that is postcard already.
+pub(super) fn put_open_bytes(value: &[u8], len: usize, body: &mut [u8]) -> Result<std::ops::Range<usize>, EncodeError> {
+    let [front @ .., 0] = value else { return Err(EncodeError::NotEmpty) };
+    let mut length = [0; LENGTH_BYTES_MAX];
+    let length = postcard::to_slice(&len, &mut length).map_err(EncodeError::Postcard)?;
+    let from = front.len() + length.len();
+    let end = from.saturating_add(len);
+    if end > body.len() {
+        return Err(EncodeError::TooLarge(end));
+    }
+    body[..front.len()].copy_from_slice(front);
+    body[front.len()..from].copy_from_slice(length);
+    Ok(from..end)
+}
+
 /// Whether the last thing in a value of this type is bytes.
 pub(super) fn ends_with_bytes(ty: &Type) -> bool {
     match ty {
@@ -135,6 +150,13 @@ mod tests {
             body[room.clone()].copy_from_slice(&pixels);
             assert_eq!((&body, room.end), (&whole, whole.len()), "{len}");
             assert_eq!(put_open(&front, len, &mut body[1..]), Err(EncodeError::TooLarge(whole.len())), "{len}");
+            let front = postcard::to_stdvec(&front).unwrap();
+            let mut body = vec![0xee; whole.len()];
+            assert_eq!(put_open_bytes(&front, len, &mut body), Ok(room.clone()), "{len}");
+            body[room].copy_from_slice(&pixels);
+            assert_eq!(body, whole, "{len}");
+            let short = put_open_bytes(&front, len, &mut body[1..]);
+            assert_eq!(short, Err(EncodeError::TooLarge(whole.len())), "{len}");
         }
     }
 
@@ -145,6 +167,7 @@ mod tests {
         assert_eq!(put_open(&one, 3, &mut body), Err(EncodeError::NotEmpty));
         assert_eq!(put_open(&Vec::<u8>::new(), 3, &mut body), Err(EncodeError::NotEmpty));
         assert_eq!(put_open(&(), 3, &mut body), Err(EncodeError::NotEmpty));
+        assert_eq!(put_open_bytes(&[7, 1, 0xee], 3, &mut body), Err(EncodeError::NotEmpty));
         for (ty, ends) in [
             (Frame::schema(), true),
             (Framed::schema(), true),

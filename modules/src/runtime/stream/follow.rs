@@ -122,7 +122,7 @@ impl FollowedRecord<'_> {
         };
         let (from, number) = (self.source.id.name, self.source.id.number);
         let origin = Origin::Stream { id: self.id, stamp: info.stamp, is_recorded: self.source.is_recorded };
-        Received::new(from, number, origin, head, self.held.body())
+        Received::new(from, number, origin, head, self.held.body()).held(&self.held)
     }
 }
 

@@ -17,6 +17,7 @@ mod noted;
 mod open;
 mod own;
 mod read;
+mod record;
 
 pub(super) use check::{CheckedReader, KnownStream};
 pub use error::{RecordError, StreamReadError};
@@ -25,7 +26,8 @@ pub use follow::StreamSubscription;
 pub(crate) use follow::{FollowedStream, FollowedStreams};
 pub use moment::Moment;
 pub(super) use noted::{note, opened};
-pub use open::OpenValue;
+pub use open::{OpenValue, SuspendedValue};
 pub(crate) use own::{OwnStream, OwnStreams, StreamItem};
 pub(super) use own::{ServedStreams, is_new, make, remove};
-pub use read::{Record, Stream};
+pub use read::Stream;
+pub use record::{Record, StayingBytes};

@@ -2,12 +2,12 @@
 
 use super::encode::{self, EncodeError};
 use super::error::RecordError;
-use super::own::OwnAbout;
+use super::own::{OwnAbout, OwnStream};
 use crate::journal::{NotedItem, NotedValue, Tag};
 use crate::runtime::context::Distribution;
 use crate::runtime::error::ContextError;
 use crate::runtime::newest::Published;
-use rohrpost_mailbox::OpenRecord;
+use rohrpost_mailbox::{OpenRecord, RecordPlace, StreamWriter, SuspendedRecord};
 use rohrpost_schema::Data;
 use std::marker::PhantomData;
 
@@ -52,6 +52,24 @@ pub struct OpenValue<'a, T> {
     data: PhantomData<fn(T)>,
 }
 
+/// A value that is being written in place, and does not keep its context meanwhile.
+#[must_use = "its place is lost to the stream unless it is taken up again"]
+pub struct SuspendedValue {
+    record: SuspendedRecord,
+    len: Option<usize>,
+    stamp_ns: u64,
+    sequence: u64,
+    endpoint: usize,
+    number: u16,
+}
+
+impl SuspendedValue {
+    /// Whether it is of this stream.
+    pub(in crate::runtime) fn is_of(&self, stream: &OwnStream) -> bool {
+        stream.is(self.endpoint, self.number)
+    }
+}
+
 impl<'a, T: Data> OpenValue<'a, T> {
     pub(in crate::runtime) fn new(
         record: OpenRecord<'a>,
@@ -72,8 +90,11 @@ impl<'a, T: Data> OpenValue<'a, T> {
         Ok(())
     }
 
-    /// Puts in a value that is postcard already.
-    pub(in crate::runtime) fn put_bytes(&mut self, bytes: &[u8]) -> Result<(), ContextError> {
+    /// Puts in a value that is postcard already, in place of what was put in before; nobody looks whether it is.
+    ///
+    /// # Errors
+    /// [`RecordError::TooLarge`].
+    pub fn put_bytes(&mut self, bytes: &[u8]) -> Result<(), ContextError> {
         let Some(room) = self.record.body_mut().get_mut(..bytes.len()) else {
             return Err(self.explain(EncodeError::TooLarge(bytes.len())).into());
         };
@@ -97,6 +118,43 @@ impl<'a, T: Data> OpenValue<'a, T> {
         let room = put.map_err(|error| self.explain(error))?;
         self.len = Some(room.end);
         Ok(&mut self.record.body_mut()[room])
+    }
+
+    /// As [`OpenValue::fill`]; the value, of which the last field is empty, is postcard already.
+    ///
+    /// # Errors
+    /// As for [`OpenValue::fill`].
+    pub fn fill_bytes(&mut self, value: &[u8], len: usize) -> Result<&mut [u8], ContextError> {
+        let put = match self.about.item.ends_with_bytes {
+            true => encode::put_open_bytes(value, len, self.record.body_mut()),
+            false => Err(EncodeError::NotEmpty),
+        };
+        let room = put.map_err(|error| self.explain(error))?;
+        self.len = Some(room.end);
+        Ok(&mut self.record.body_mut()[room])
+    }
+
+    /// Where all of it is in the stream's memory, as long as a record may be; none of a stream with small records,
+    /// which are filled elsewhere.
+    pub fn place(&self) -> Option<RecordPlace> {
+        self.record.at()
+    }
+
+    /// Lets go of the context, until [`super::super::Context::resume`]; what was put in stays.
+    pub fn suspend(self) -> SuspendedValue {
+        let (endpoint, number) = (self.about.endpoint, self.about.item.number);
+        let (record, len) = (self.record.suspend(), self.len);
+        SuspendedValue { record, len, stamp_ns: self.stamp_ns, sequence: self.sequence, endpoint, number }
+    }
+
+    pub(in crate::runtime) fn resumed(
+        suspended: SuspendedValue,
+        writer: &'a mut StreamWriter,
+        about: &'a OwnAbout,
+        outlet: Distribution<'a>,
+    ) -> Self {
+        let SuspendedValue { record, len, stamp_ns, sequence, .. } = suspended;
+        Self { record: writer.resume(record), len, stamp_ns, sequence, about, outlet, data: PhantomData }
     }
 
     /// Makes it the stream's newest record; its sequence, which counts the stream's records. It is counted as

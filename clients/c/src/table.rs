@@ -1,0 +1,218 @@
+//! Handles: which objects this thread has opened.
+//!
+//! ```text
+//!  63        40 39          24 23    16 15     0
+//!  ┌───────────┬──────────────┬────────┬────────┐
+//!  │ thread    │ turn of place│ kind   │ place  │   0 is no handle
+//!  └───────────┴──────────────┴────────┴────────┘
+//! ```
+//!
+//! A table is its thread's own, so a look-up takes no lock. A place that is used again has another turn, so a closed
+//! handle is found until its place was used 65 536 times.
+
+use crate::code::Code;
+use crate::edge::say;
+use crate::mailbox::{ReceiverObject, SenderObject};
+use crate::node::NodeObject;
+use crate::stream::{ReaderObject, WriterObject};
+use std::cell::RefCell;
+use std::sync::Once;
+use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
+
+/// Places of a table.
+const PLACES_MAX: usize = 1 << 16;
+/// Threads are told apart by so many bits.
+const THREAD_MASK: u32 = (1 << 24) - 1;
+
+/// What a handle stands for.
+pub(crate) enum Object {
+    Node(NodeObject),
+    Sender(SenderObject),
+    Receiver(ReceiverObject),
+    Writer(WriterObject),
+    Reader(ReaderObject),
+}
+
+/// A kind of object.
+pub(crate) trait Kind: Sized {
+    /// Its number in handles; not 0.
+    const NUMBER: u8;
+    /// What messages call it.
+    const WHAT: &'static str;
+    fn store(self) -> Object;
+    fn find(object: &mut Object) -> Option<&mut Self>;
+    fn take(object: Object) -> Option<Self>;
+}
+
+macro_rules! kinds {
+    ($($variant:ident($object:ident) $number:literal $what:literal),*) => {$(
+        impl Kind for $object {
+            const NUMBER: u8 = $number;
+            const WHAT: &'static str = $what;
+
+            fn store(self) -> Object {
+                Object::$variant(self)
+            }
+
+            fn find(object: &mut Object) -> Option<&mut Self> {
+                if let Object::$variant(object) = object { Some(object) } else { None }
+            }
+
+            fn take(object: Object) -> Option<Self> {
+                if let Object::$variant(object) = object { Some(object) } else { None }
+            }
+        }
+    )*};
+}
+kinds! {
+    Node(NodeObject) 1 "node",
+    Sender(SenderObject) 2 "sender",
+    Receiver(ReceiverObject) 3 "receiver",
+    Writer(WriterObject) 4 "writer of a stream",
+    Reader(ReaderObject) 5 "reader of a stream"
+}
+
+/// How often this process became a child by `fork`: what was opened before that is its parent's.
+static FORKS: AtomicU32 = AtomicU32::new(0);
+/// What a child has of its parent, never dropped. Here, for programs that look for memory which nobody knows any more.
+static OF_PARENT: AtomicPtr<Vec<Place>> = AtomicPtr::new(std::ptr::null_mut());
+/// The last thread that was counted.
+static THREADS: AtomicU32 = AtomicU32::new(0);
+
+extern "C" fn count_fork() {
+    FORKS.fetch_add(1, Ordering::Relaxed);
+}
+
+struct Place {
+    turn: u16,
+    object: Option<Object>,
+}
+
+struct Table {
+    thread: u32,
+    forks: u32,
+    places: Vec<Place>,
+}
+
+thread_local! {
+    static TABLE: RefCell<Table> = RefCell::new(Table::new());
+}
+
+impl Table {
+    fn new() -> Self {
+        static WATCH_FORKS: Once = Once::new();
+        // SAFETY: the function only changes an atomic, which a child of a process with threads may do. (Without memory
+        // for it, forks go unseen, and so does everything else soon.)
+        WATCH_FORKS.call_once(|| _ = unsafe { libc::pthread_atfork(None, None, Some(count_fork)) });
+        // Not 0, with which no handle begins.
+        let thread = loop {
+            match THREADS.fetch_add(1, Ordering::Relaxed) & THREAD_MASK {
+                0 => {}
+                thread => break thread,
+            }
+        };
+        Self { thread, forks: FORKS.load(Ordering::Relaxed), places: Vec::new() }
+    }
+
+    fn is_forked(&self) -> bool {
+        self.forks != FORKS.load(Ordering::Relaxed)
+    }
+
+    fn store(&mut self, object: Object, kind: u8) -> Result<u64, Code> {
+        let free = self.places.iter().position(|place| place.object.is_none());
+        let index = free.unwrap_or(self.places.len());
+        if index == PLACES_MAX {
+            return Err(say(Code::Crowded, format_args!("this thread has {PLACES_MAX} open handles; close some")));
+        }
+        if free.is_none() {
+            self.places.push(Place { turn: 0, object: None });
+        }
+        let place = &mut self.places[index];
+        place.object = Some(object);
+        let [thread, turn, kind] = [u64::from(self.thread), u64::from(place.turn), u64::from(kind)];
+        Ok(thread << 40 | turn << 24 | kind << 16 | index as u64)
+    }
+
+    /// The place of a handle, if that is open here.
+    #[inline]
+    fn place<K: Kind>(&mut self, handle: u64) -> Result<&mut Place, Code> {
+        let (thread, kind) = ((handle >> 40) as u32, (handle >> 16) as u8);
+        if thread != self.thread || kind != K::NUMBER || self.is_forked() {
+            return Err(self.refuse::<K>(thread, kind));
+        }
+        let place = self.places.get_mut((handle & 0xffff) as usize);
+        place.filter(|place| place.object.is_some() && place.turn == (handle >> 24) as u16).ok_or_else(closed::<K>)
+    }
+
+    #[cold]
+    fn refuse<K: Kind>(&self, thread: u32, kind: u8) -> Code {
+        let what = K::WHAT;
+        if thread == 0 || kind != K::NUMBER {
+            return say(Code::Handle, format_args!("this is no handle of a {what}"));
+        }
+        if thread != self.thread {
+            return say(Code::Thread, format_args!("this {what} belongs to another thread, which opened it"));
+        }
+        forked()
+    }
+}
+
+#[cold]
+fn closed<K: Kind>() -> Code {
+    say(Code::Closed, format_args!("this {} was closed", K::WHAT))
+}
+
+#[cold]
+fn forked() -> Code {
+    let why = "this thread used Rohrpost before its process was forked";
+    say(Code::Forked, format_args!("{why}; what it opened is the parent's: call exec, or use another thread"))
+}
+
+impl Drop for Table {
+    fn drop(&mut self) {
+        if self.is_forked() {
+            // Locks and places in the node's table are the parent's: dropping would give them up in its name.
+            OF_PARENT.store(Box::into_raw(Box::new(std::mem::take(&mut self.places))), Ordering::Relaxed);
+        }
+    }
+}
+
+/// Uses this thread's table; not while it is used, as a handler of signals would.
+fn with_table<T>(use_it: impl FnOnce(&mut Table) -> Result<T, Code>) -> Result<T, Code> {
+    let used = TABLE.try_with(|table| match table.try_borrow_mut() {
+        Ok(mut table) => use_it(&mut table),
+        Err(_) => Err(say(Code::Busy, format_args!("another call of this thread goes on: is this a signal handler?"))),
+    });
+    used.unwrap_or_else(|_| Err(say(Code::Closed, format_args!("this thread ends, and all its handles are closed"))))
+}
+
+/// Makes an object, and gives it a handle.
+pub(crate) fn open<K: Kind>(make: impl FnOnce() -> Result<K, Code>) -> Result<u64, Code> {
+    with_table(|table| if table.is_forked() { Err(forked()) } else { Ok(()) })?;
+    // Other handles may be used meanwhile.
+    let object = make()?;
+    with_table(|table| table.store(object.store(), K::NUMBER))
+}
+
+/// Whether a handle is of this kind, open or not.
+pub(crate) fn is_a<K: Kind>(handle: u64) -> bool {
+    (handle >> 16) as u8 == K::NUMBER
+}
+
+/// Uses what a handle stands for.
+#[inline]
+pub(crate) fn with<K: Kind, T>(handle: u64, use_it: impl FnOnce(&mut K) -> Result<T, Code>) -> Result<T, Code> {
+    with_table(|table| {
+        let object = table.place::<K>(handle)?.object.as_mut().and_then(K::find);
+        use_it(object.ok_or_else(closed::<K>)?)
+    })
+}
+
+/// Closes a handle, and gives what it stood for.
+pub(crate) fn close<K: Kind>(handle: u64) -> Result<K, Code> {
+    with_table(|table| {
+        let place = table.place::<K>(handle)?;
+        place.turn = place.turn.wrapping_add(1);
+        place.object.take().and_then(K::take).ok_or_else(closed::<K>)
+    })
+}

@@ -1,0 +1,286 @@
+//! Modules in C, the examples of `clients/c`, beside modules in Rust: compiled as the book says, launched, listed,
+//! called, killed, and with one stream that both read in place.
+
+use crate::harness::{PATIENCE, Place, Robot, runs, signal, wait};
+use crate::process::Running;
+use crate::terminal::open_pair;
+use nix::sys::signal::Signal;
+use rohrpost::interfaces::CameraInterface;
+use rohrpost::serde::Deserialize;
+use rohrpost::types::Image;
+use rohrpost::{Context, Module, ModuleError, Received, StreamSubscription};
+use rohrpost_mailbox::{Label, Participant, Priority, Shape, Type};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+const PAGE: &str = include_str!("../../docs/src/c.md");
+
+const CLASSES: &str = "
+[classes.thermometer]
+id = 120
+[classes.counter]
+id = 118
+[classes.motor]
+id = 200
+[classes.odometry]
+id = 160
+[classes.laser]
+id = 150
+[classes.camera]
+id = 112
+[classes.looker]
+id = 110
+[classes.viewer]
+id = 108
+[classes.mapper]
+id = 95
+";
+
+/// Not a test: a module that launch starts. Run as a test it ends at once.
+#[test]
+fn module() {
+    if std::env::var_os("ROHRPOST_MODULE").is_some() {
+        let code = rohrpost::run::<Looker>();
+        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
+    }
+}
+
+/// Looks at a camera's pictures in Rust.
+#[rohrpost::interface(class = "looker")]
+trait Looking {
+    /// How many whole pictures it has seen.
+    #[command(16)]
+    fn seen(&mut self) -> u64;
+}
+
+#[derive(Deserialize)]
+#[serde(crate = "rohrpost::serde", deny_unknown_fields)]
+struct LookerSettings {}
+
+struct Looker {
+    pictures: StreamSubscription<Image>,
+    seen: u64,
+}
+
+impl Module for Looker {
+    type Settings = LookerSettings;
+    type Interfaces = LookingInterface;
+
+    fn new(_: LookerSettings, context: &mut Context) -> Result<Self, ModuleError> {
+        Ok(Self { pictures: context.subscribe_stream(CameraInterface::IMAGE, "camera.0")?, seen: 0 })
+    }
+
+    fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
+        let Some(picture) = data.view(&self.pictures)? else { return Ok(()) };
+        for (row, pixels) in picture.rows()?.enumerate() {
+            let first = pixels[0];
+            let is_whole =
+                pixels.chunks(3).enumerate().all(|(column, pixel)| *pixel == [first, row as u8, column as u8]);
+            if !is_whole {
+                return Err(ModuleError::new(format!("row {row} is of two pictures")));
+            }
+        }
+        self.seen += 1;
+        Ok(())
+    }
+}
+
+impl Looking for Looker {
+    fn seen(&mut self) -> u64 {
+        self.seen
+    }
+}
+
+fn client() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("clients/c")
+}
+
+/// Compiles an example.
+fn example(place: &Place, name: &str) -> PathBuf {
+    compiled(place, &client().join(format!("examples/{name}.c")))
+}
+
+/// Compiles a program of the book.
+fn book(place: &Place, name: &str) -> PathBuf {
+    let fence = format!("```{} {name}\n", name.rsplit_once('.').unwrap().1);
+    let code = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no {name}")).split("```").next().unwrap();
+    std::fs::write(place.path(name), code).unwrap();
+    compiled(place, &place.path(name))
+}
+
+/// Compiles a program with the library that Cargo has put beside this one.
+fn compiled(place: &Place, source: &Path) -> PathBuf {
+    let library = std::env::current_exe().unwrap().parent().unwrap().to_owned();
+    let program = place.path(source.file_stem().unwrap().to_str().unwrap());
+    let is_c = source.extension().unwrap() == "c";
+    let (compiler, standard) = if is_c { ("cc", "-std=c11") } else { ("c++", "-std=c++17") };
+    let output = Command::new(compiler)
+        .args([standard, "-Wall", "-Wextra", "-Werror", "-D_GNU_SOURCE", "-o"])
+        .arg(&program)
+        .arg(source)
+        .arg(format!("-I{}", client().join("include").display()))
+        .arg(format!("-L{0}", library.display()))
+        .arg(format!("-Wl,-rpath,{}", library.display()))
+        .args(["-lrohrpost_c", "-lm"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    program
+}
+
+/// A module's lines in a configuration.
+fn entry(name: &str, program: &str, more: &str) -> String {
+    format!("[[module]]\nname = \"{name}\"\nprogram = {program}\n{more}\n")
+}
+
+/// What a module says that it has seen.
+fn seen(place: &Place, module: &str) -> u64 {
+    place.say(&["call", module, "seen"]).ok().trim().parse().unwrap()
+}
+
+fn stop(place: &Place, robot: Robot, launch: &mut Running) {
+    drop(robot);
+    launch.stop();
+    place.assert_empty();
+}
+
+#[test]
+fn modules_in_rust_and_in_c_read_one_stream_in_place_that_a_camera_in_c_writes() {
+    let place = Place::new();
+    let [camera, viewer] = ["camera", "viewer"].map(|name| format!("{:?}", example(&place, name)));
+    let looker =
+        format!("[{:?}, \"--exact\", \"c_modules::module\", \"--nocapture\"]", std::env::current_exe().unwrap());
+    let (mut launch, robot) = place.launched(&[
+        CLASSES,
+        &entry("camera.0", &camera, "[module.stream.image]\nrecord = \"256 KiB\"\nkeep = 4"),
+        &entry("viewer.0", &viewer, "calls = [\"camera.0\"]"),
+        &entry("looker.0", &looker, "calls = [\"camera.0\"]"),
+    ]);
+    let listed = place.say(&["list"]).ok();
+    assert!(["camera.0", "viewer.0", "looker.0"].iter().all(|name| listed.contains(name)), "{listed}");
+    for module in ["viewer.0", "looker.0"] {
+        wait(format!("{module} sees"), || (seen(&place, module) > 0).then_some(()));
+    }
+    let described = place.say(&["call", "viewer.0"]).ok();
+    assert!(described.contains("seen -> u64\n      How many pictures it has seen."), "{described}");
+    assert!(described.contains("brightness: f64\n      Of the whole picture, 0 to 255."), "{described}");
+    let echoed = place.say(&["echo", "viewer.0", "--count", "1"]).ok();
+    let brightness: f64 = echoed.trim().rsplit_once(' ').unwrap().1.parse().unwrap();
+    assert!((80.0..=180.0).contains(&brightness), "{brightness}");
+    let streams = place.say(&["stream", "list", "--json"]).json();
+    let image = streams["streams"].as_array().unwrap().iter().find(|stream| stream["stream"] == "camera.0").unwrap();
+    assert_eq!((&image["readers"], &image["record_bytes"]), (&2.into(), &262_144.into()), "{streams:#}");
+    let refused = place.say(&["send", "viewer.0", "look"]).fails();
+    assert!(refused.contains("look"), "{refused}");
+    // Killed, it is started again, and goes on with its stream; so do its readers.
+    let pid = robot.pid("camera.0");
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted("camera.0", pid);
+    let before = [seen(&place, "viewer.0"), seen(&place, "looker.0")];
+    for (module, before) in ["viewer.0", "looker.0"].into_iter().zip(before) {
+        wait(format!("{module} sees on"), || (seen(&place, module) > before).then_some(()));
+    }
+    stop(&place, robot, &mut launch);
+}
+
+/// The microcontroller at the other end of a serial line.
+struct Wheels {
+    line: File,
+    count: i64,
+}
+
+impl Wheels {
+    fn turn(&mut self) {
+        self.count += 10;
+        writeln!(self.line, "{} {}", self.count, self.count).unwrap();
+    }
+}
+
+#[test]
+fn a_driver_in_c_gives_the_mapper_the_odometry_that_it_makes_of_a_serial_line() {
+    let place = Place::new();
+    let driver = format!("{:?}", example(&place, "driver"));
+    let (line, slave, port) = open_pair();
+    let map = client().join("../../config/building.map");
+    let (mut launch, robot) = place.launched(&[
+        CLASSES,
+        "[[module]]\nname = \"motor.0\"\naliases = [\"odometry.1\", \"laser.0\"]\nbuiltin = \"sim\"\n",
+        &format!("settings = {{ map = {map:?}, seed = 1, laser-rate-hz = 20 }}\n"),
+        &entry("odometry.0", &driver, &format!("settings = {{ port = {port:?}, count-m = 0.002 }}")),
+        "[[module]]\nname = \"mapper.0\"\nbuiltin = \"mapper\"\ncalls = [\"laser.0\", \"odometry.0\"]\n",
+        "settings = { laser = \"laser.0\", odometry = \"odometry.0\" }\n",
+    ]);
+    let mut wheels = Wheels { line, count: 0 };
+    wait("the mapper maps scans by the odometry of C", || {
+        wheels.turn();
+        let counts = place.say(&["call", "mapper.0", "counts"]).ok();
+        let mapped = counts.split_once("mapped: ").unwrap().1.split([',', '}']).next().unwrap();
+        (mapped != "0").then_some(())
+    });
+    wheels.turn();
+    let at = place.say(&["echo", "odometry.0", "--count", "1"]).ok();
+    assert!(at.contains("pose: {x_m: ") && at.contains("heading_rad: 0}"), "{at}");
+    // A parameter with a range of its own, and one that the module itself refuses.
+    place.say(&["param", "set", "odometry.0", "count-m", "0.004"]).ok();
+    let refused = place.say(&["param", "set", "odometry.0", "track-m", "20"]).fails();
+    assert!(refused.contains("`track-m` is 20 m, out of range: 0.01..=10 m"), "{refused}");
+    let refused = place.say(&["param", "set", "odometry.0", "port", "/dev/null"]).fails();
+    assert!(refused.contains("the port is opened when the module starts: restart it"), "{refused}");
+    writeln!(wheels.line, "no counts").unwrap();
+    wait("a line that cannot be read is told", || {
+        launch.assert_runs();
+        launch.err().contains("something that is not two counts").then_some(())
+    });
+    drop(slave);
+    stop(&place, robot, &mut launch);
+}
+
+#[test]
+fn the_programs_of_the_book_do_what_it_says() {
+    let place = Place::new();
+    let [thermometer, counter, echo] =
+        ["thermometer.c", "counter.cpp", "echo.c"].map(|name| book(&place, name).display().to_string());
+    let (mut launch, robot) = place.launched(&[
+        CLASSES,
+        &entry("thermometer.0", &format!("{thermometer:?}"), "settings = { volts-per-degree = 0.02 }"),
+        &entry("counter.0", &format!("{counter:?}"), ""),
+    ]);
+    assert_eq!(place.say(&["call", "thermometer.0", "calibrate", "21.5"]).ok(), "1.5\n");
+    wait("it says what it was told", || {
+        place.say(&["echo", "thermometer.0", "--count", "1"]).ok().ends_with(" 21.5\n").then_some(())
+    });
+    let bad = place.say(&["call", "thermometer.0", "calibrate", "warm"]).fails();
+    assert!(bad.contains("true_c"), "{bad}");
+    wait("it counts", || place.say(&["echo", "counter.0", "--count", "1"]).ok().ends_with(" 2\n").then_some(()));
+    let mut command = Command::new(&echo);
+    command.arg(&robot.installation.path).arg("main").env("ROHRPOST_DIR", place.memory());
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut echo = Running::start(command);
+    let [me, there] = ["tool.71", "tool.70"].map(|name| robot.name(name));
+    let participant = Participant::join(&robot.node, me).unwrap();
+    let mut receiver = participant.receiver(me, Shape::default()).unwrap();
+    let mut sender = wait("it receives", || {
+        echo.assert_runs();
+        participant.sender(there).ok()
+    });
+    let label = Label { from: me, kind: Type::command(16), id: 7, priority: Priority(16), ..Label::default() };
+    sender.send(&label, &[b"there and back"]).unwrap();
+    let package = receiver.receive_timeout(PATIENCE).unwrap();
+    assert_eq!((package.head().id, package.body()), (7, &b"there and back"[..]));
+    drop(package);
+    sender.send(&label, &[]).unwrap();
+    assert!(echo.end().success());
+    receiver.close();
+    drop((sender, participant));
+    // When launch dies, whatever killed it, they end as modules in Rust do.
+    let all = ["thermometer.0", "counter.0"].map(|name| (robot.name(name), robot.pid(name)));
+    launch.signal(Signal::SIGKILL);
+    launch.end();
+    wait("no module is left", || all.iter().all(|(_, pid)| !runs(*pid)).then_some(()));
+    assert!(all.iter().all(|(name, pid)| robot.node.last_word_of(*name, *pid).is_none()), "they left in order");
+    drop(robot);
+    place.say(&["clean"]).ok();
+    place.assert_empty();
+}
