@@ -1,4 +1,4 @@
-// Ping-pong by mailboxes in C, as `benches/src/harness/ping_pong.rs` does it in Rust: the same messages, the same checks.
+// Ping-pong by mailboxes in C, as `benches/src/harness/ping_pong.rs` plays it in Rust: the same messages and checks.
 //
 // Arguments: ping or pong, bytes, messages, warm-up, cap (ms), file for samples; directory of the node, blocking or
 // spinning.

@@ -1,5 +1,5 @@
-//! A module that does nothing but answer: what commands are measured with. It is this program again, in a process of its
-//! own.
+//! A module that does nothing but answer: what commands are measured with. It is this program again, in a process of
+//! its own.
 
 use crate::harness::{Child, End, Failure, Placement, Scheduling, settle};
 use rohrpost_config::Installation;

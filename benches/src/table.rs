@@ -159,9 +159,8 @@ pub fn human_environment(environment: &Environment) -> String {
         ),
     };
     let versions: String = versions.iter().map(|version| format!("\nversion    {version}")).collect();
-    format!(
-        "processor  {processor}, {count} of them\nkernel     {kernel}\nload       {load}\nscheduler  {granted}{versions}"
-    )
+    let head = format!("processor  {processor}, {count} of them\nkernel     {kernel}\nload       {load}");
+    format!("{head}\nscheduler  {granted}{versions}")
 }
 
 /// Where it was measured: the first JSON object.

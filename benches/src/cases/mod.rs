@@ -3,10 +3,10 @@
 mod case;
 mod cost;
 mod flood;
-#[cfg(feature = "languages")]
-pub mod languages;
 #[cfg(feature = "lan")]
 pub mod lan;
+#[cfg(feature = "languages")]
+pub mod languages;
 mod latency;
 mod many;
 mod memory;

@@ -39,9 +39,9 @@ impl Case for RemoteCall {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let (cell, python) = (cell(settings), Interpreter::of(settings));
         let (segment, parts) = (TcpSegment::start(settings, Security::None), Parts::default());
-        let motor = segment.systems().and_then(|systems| {
-            start_motor(&systems.folder(), &systems.configuration(End::Pong), cell.placement)
-        });
+        let motor = segment
+            .systems()
+            .and_then(|systems| start_motor(&systems.folder(), &systems.configuration(End::Pong), cell.placement));
         let contenders = [
             Contender::sampled("Python", || call(&cell, &python, &segment, &motor)),
             Contender::single("sockets + hop", || parts.time(&cell, &python, &segment)),
