@@ -19,6 +19,9 @@ pub struct Environment {
     /// What the kernel refuses of pinning, real-time scheduling and locked memory; empty: nothing.
     #[serde(rename = "refused")]
     pub refusals: Vec<String>,
+    /// Versions of what is measured that is not of this repository.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub versions: Vec<String>,
 }
 
 impl Environment {
@@ -26,7 +29,7 @@ impl Environment {
     ///
     /// # Errors
     /// When not even a process can be forked.
-    pub fn look() -> Result<Self, Failure> {
+    pub fn look(versions: &[String]) -> Result<Self, Failure> {
         let read = |path| fs::read_to_string(path).unwrap_or_default().trim().to_string();
         let cpuinfo = read("/proc/cpuinfo");
         let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
@@ -36,6 +39,7 @@ impl Environment {
             kernel: read("/proc/sys/kernel/osrelease"),
             load: load(),
             refusals: ask_refusals()?,
+            versions: versions.to_vec(),
         })
     }
 }

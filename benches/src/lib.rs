@@ -20,10 +20,16 @@ pub mod floors;
 pub mod harness;
 #[cfg(feature = "lan")]
 pub mod lan;
+#[cfg(feature = "languages")]
+pub mod languages;
+#[cfg(any(feature = "languages", feature = "recording"))]
+pub mod motor;
 pub mod one_way;
 pub mod ours;
 #[cfg(feature = "peers")]
 pub mod peers;
+#[cfg(feature = "languages")]
+pub mod player;
 pub mod report;
 pub mod rounds;
 pub mod settings;

@@ -1,4 +1,4 @@
-//! `cargo run --release -p rohrpost-bench -- local`, `streams`, `recording`, `lan`, `tdma` or `tcp`.
+//! `cargo run --release -p rohrpost-bench -- local`, `streams`, `recording`, `lan`, `tdma`, `tcp` or `languages`.
 
 use clap::{Parser, Subcommand};
 use rohrpost_bench::cases::Case;
@@ -37,6 +37,15 @@ enum Command {
     /// Packages between systems, over the TCP router: the loopback device.
     #[cfg(feature = "lan")]
     Tcp(Run),
+    /// Programs in C and in Python, beside the same in Rust.
+    #[cfg(feature = "languages")]
+    Languages {
+        #[command(flatten)]
+        run: Run,
+        /// The interpreter, with the packages to measure; without it, `python3` with the sources of this repository.
+        #[arg(long, value_name = "PATH")]
+        python: Option<PathBuf>,
+    },
 }
 
 #[derive(clap::Args)]
@@ -85,6 +94,8 @@ fn main() -> ExitCode {
         }
         #[cfg(feature = "lan")]
         Command::Tcp(run) => measure(&run, &cases::tcp::all()),
+        #[cfg(feature = "languages")]
+        Command::Languages { run, python } => measure_languages(&run, python),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,
@@ -98,9 +109,24 @@ fn main() -> ExitCode {
 
 /// False when a contender failed.
 fn measure(arguments: &Run, cases: &[Box<dyn Case>]) -> Result<bool, Failure> {
+    run(arguments, &settings(arguments), cases)
+}
+
+#[cfg(feature = "languages")]
+fn measure_languages(arguments: &Run, python: Option<PathBuf>) -> Result<bool, Failure> {
+    use rohrpost_bench::languages::{Interpreter, c_version};
+    let mut settings = Settings { python, ..settings(arguments) };
+    settings.versions = c_version().into_iter().chain(Interpreter::of(&settings).versions()).collect();
+    run(arguments, &settings, &cases::languages::all())
+}
+
+fn settings(arguments: &Run) -> Settings {
     let rounds = if arguments.quick { arguments.rounds.min(1) } else { arguments.rounds };
-    let settings =
-        Settings { rounds, only: arguments.only.clone(), quick: arguments.quick, rohrpost: arguments.rohrpost.clone() };
+    let (only, rohrpost) = (arguments.only.clone(), arguments.rohrpost.clone());
+    Settings { rounds, only, quick: arguments.quick, rohrpost, ..Settings::default() }
+}
+
+fn run(arguments: &Run, settings: &Settings, cases: &[Box<dyn Case>]) -> Result<bool, Failure> {
     let say = |text: String| writeln!(io::stdout(), "{text}").is_ok();
-    Ok(report::run(&settings, cases, arguments.json, say)?.is_sound())
+    Ok(report::run(settings, cases, arguments.json, say)?.is_sound())
 }

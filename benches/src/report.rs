@@ -38,7 +38,7 @@ pub fn run(
     check_names(&settings.only, cases)?;
     harness::heed();
     harness::sweep();
-    let environment = Environment::look()?;
+    let environment = Environment::look(&settings.versions)?;
     let mut report = Report { environment, rows: Vec::new() };
     let head = &report.environment;
     let mut is_read =

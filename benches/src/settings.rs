@@ -14,11 +14,15 @@ pub struct Settings {
     pub quick: bool,
     /// The `rohrpost` command to measure; none: the one beside this program.
     pub rohrpost: Option<PathBuf>,
+    /// The interpreter for programs in Python; none: the system's.
+    pub python: Option<PathBuf>,
+    /// Versions of what is measured, for the head.
+    pub versions: Vec<String>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { rounds: 7, only: Vec::new(), quick: false, rohrpost: None }
+        Self { rounds: 7, only: Vec::new(), quick: false, rohrpost: None, python: None, versions: Vec::new() }
     }
 }
 

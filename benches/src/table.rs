@@ -148,7 +148,7 @@ fn object(value: &impl Serialize) -> String {
 
 /// Where it was measured, for people.
 pub fn human_environment(environment: &Environment) -> String {
-    let Environment { processor, processors, kernel, load, refusals } = environment;
+    let Environment { processor, processors, kernel, load, refusals, versions } = environment;
     let count = processors.len();
     let pair = processors.iter().take(2).map(ToString::to_string).collect::<Vec<_>>().join(" and ");
     let granted = match refusals.as_slice() {
@@ -158,7 +158,9 @@ pub fn human_environment(environment: &Environment) -> String {
             refusals.join("; ")
         ),
     };
-    format!("processor  {processor}, {count} of them\nkernel     {kernel}\nload       {load}\nscheduler  {granted}")
+    let versions: String = versions.iter().map(|version| format!("\nversion    {version}")).collect();
+    let head = format!("processor  {processor}, {count} of them\nkernel     {kernel}\nload       {load}");
+    format!("{head}\nscheduler  {granted}{versions}")
 }
 
 /// Where it was measured: the first JSON object.

@@ -163,7 +163,7 @@ mod tests {
     fn environment(refusals: &[&str]) -> Environment {
         let [processor, kernel, load] = [const { String::new() }; 3];
         let refusals = refusals.iter().map(ToString::to_string).collect();
-        Environment { processor, processors: vec![0, 1], kernel, load, refusals }
+        Environment { processor, processors: vec![0, 1], kernel, load, refusals, versions: Vec::new() }
     }
 
     fn said(ratio: f64, p99: f64, refusals: &[&str], scheduling: Scheduling) -> String {

@@ -152,7 +152,7 @@ impl Latency {
 }
 
 /// One turn of ours.
-fn ours(cell: &Cell, how: How) -> Result<Vec<f64>, Failure> {
+pub(super) fn ours(cell: &Cell, how: How) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
     let node = scratch.directory().join("node");
     // What is loaned is seen, from outside, by the bytes that are touched.

@@ -5,6 +5,8 @@ mod cost;
 mod flood;
 #[cfg(feature = "lan")]
 pub mod lan;
+#[cfg(feature = "languages")]
+pub mod languages;
 mod latency;
 mod many;
 mod memory;
@@ -30,8 +32,12 @@ use crate::harness::{Failure, Scheduling};
 /// # Errors
 /// When it does not do that.
 pub fn run_hidden_program() -> Option<Result<(), Failure>> {
-    #[cfg(feature = "recording")]
-    if let Some(done) = recording::run_hidden_module() {
+    #[cfg(any(feature = "languages", feature = "recording"))]
+    if let Some(done) = crate::motor::run_hidden_module() {
+        return Some(done);
+    }
+    #[cfg(feature = "languages")]
+    if let Some(done) = crate::player::run_hidden_module() {
         return Some(done);
     }
     startup::run_hidden_program()

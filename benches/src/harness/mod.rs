@@ -4,6 +4,8 @@ mod alone;
 mod asleep;
 mod child;
 mod cycles;
+#[cfg(feature = "languages")]
+mod foreign;
 mod interrupt;
 mod machine;
 mod ping_pong;
@@ -16,6 +18,8 @@ pub use alone::{Alone, alone};
 pub use asleep::{given_away, require_asleep};
 pub use child::Child;
 pub use cycles::CycleCounter;
+#[cfg(feature = "languages")]
+pub use foreign::{ForeignProgram, time_one_program, time_two_programs};
 pub use interrupt::{heed, interrupted, rest};
 pub use machine::Machine;
 #[cfg(feature = "peers")]

@@ -18,9 +18,9 @@ const STOP: u64 = u64::MAX;
 const HEAD_START: Duration = Duration::from_millis(10);
 
 /// A turn that exceeds its cap by so much hangs, and is killed.
-const GRACE: Duration = Duration::from_secs(30);
+pub(super) const GRACE: Duration = Duration::from_secs(30);
 /// Time for the second end after the first has ended: the last message to it may be lost, which it must notice itself.
-const SECOND_ENDS: Duration = Duration::from_secs(8);
+pub(super) const SECOND_ENDS: Duration = Duration::from_secs(8);
 
 /// One end of a connection in both directions.
 pub trait Link {

@@ -90,6 +90,16 @@ impl Systems {
         self.address
     }
 
+    /// Where both nodes lie.
+    pub fn folder(&self) -> PathBuf {
+        self.scratch.directory()
+    }
+
+    /// The configuration of an end.
+    pub fn configuration(&self, end: End) -> PathBuf {
+        config(&self.scratch, end)
+    }
+
     /// Digest of what is equal in both configurations.
     pub fn common(&self) -> u64 {
         self.common
@@ -223,7 +233,7 @@ fn config(scratch: &Scratch, end: End) -> PathBuf {
 
 /// A free port of a loopback address of this process alone: nobody else connects from there, and so takes the port
 /// meanwhile.
-pub(super) fn free_address() -> Result<SocketAddr, Failure> {
+pub fn free_address() -> Result<SocketAddr, Failure> {
     let [_, high, middle, low] = std::process::id().to_be_bytes();
     // 127.128.0.0/9 without its first and last addresses; a PID has 22 bits.
     let own = Ipv4Addr::new(127, 128 | high, middle, low.clamp(1, 254));
@@ -244,6 +254,7 @@ fn configuration(end: End, security: Security, at: SocketAddr) -> String {
 name = "{node}"
 id = {system}
 [classes]
+motor = {{ id = 200, text = "Answers calls" }}
 router = {{ id = 250, text = "Carries packages between nodes" }}
 bench = {{ id = {bench}, text = "Is timed" }}
 tcp = {{ id = 64, text = "Carries packages beyond the LAN" }}
@@ -259,6 +270,11 @@ clients = {CLIENTS_MAX}
 name = "bench.0"
 node = "{node}"
 program = "bench"
+optional = true
+[[module]]
+name = "motor.0"
+node = "{node}"
+program = "motor"
 optional = true
 "#,
         bench = BENCH.0,

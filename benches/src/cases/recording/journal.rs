@@ -5,22 +5,15 @@
 use super::super::Case;
 use super::super::case::{Done, as_failure};
 use crate::harness::{
-    Child, End, Failure, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
+    End, Failure, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
 };
+use crate::motor::{MOTOR, reach_motor, start_motor};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
-use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, StreamId, node_directory};
-use rohrpost_modules::call::Caller;
-use rohrpost_modules::interface::Proxy;
-use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy};
+use rohrpost_mailbox::{Node, StreamId};
 use rohrpost_modules::journal::JOURNAL_NUMBER;
-use rohrpost_modules::runtime::{Context, Start, ToolLink, run_started};
-use rohrpost_modules::{Module, ModuleError};
 use std::fs;
-use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -29,16 +22,7 @@ const COMMANDS: usize = 10_000;
 const WARM_UP: usize = 1_000;
 /// Before a command to a module on the other processor, which goes to sleep meanwhile.
 const PAUSE: Duration = Duration::from_micros(100);
-/// A module starts in milliseconds.
-const READY_WITHIN: Duration = Duration::from_secs(20);
-const LOOK_EACH: Duration = Duration::from_millis(2);
-/// No command waits longer for its answer.
-const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 const PATIENCE: Duration = Duration::from_secs(120);
-/// Set for the hidden program that is the module.
-const ROLE: &str = "ROHRPOST_BENCH_MODULE";
-const MOTOR: Name = Name::new(1, 200, 0, 0);
-const NODE: &str = "main";
 const CONFIGURATION: &str = r#"
 installation = "bench"
 [system]
@@ -109,7 +93,7 @@ fn turn(settings: &Settings, event: &NotedEvent, has_journal: bool) -> Result<Ve
     let recording = if has_journal { RECORDING.replace("MODULE", "motor.0") } else { String::new() };
     fs::write(&config, format!("{CONFIGURATION}{recording}"))
         .map_err(|error| Failure::of("its configuration", error))?;
-    let mut module = start_module(&scratch.directory(), &config, event.placement())?;
+    let mut module = start_motor(&scratch.directory(), &config, event.placement())?;
     let counts = [WARM_UP, COMMANDS].map(|count| settings.count(count));
     let samples = sample_in_child(PATIENCE, |samples| {
         let commanded = command(&scratch.directory(), &config, (event, module.pid()), counts, samples);
@@ -121,24 +105,6 @@ fn turn(settings: &Settings, event: &NotedEvent, has_journal: bool) -> Result<Ve
     Ok(samples)
 }
 
-/// The module: this program again.
-fn start_module(scratch: &Path, config: &Path, placement: Placement) -> Result<Child, Failure> {
-    Child::start(|| {
-        settle(End::Pong, placement, Scheduling::Fifo)?;
-        let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
-        let error = Command::new(own)
-            .arg("--config")
-            .arg(config)
-            .args(["--name", "motor.0"])
-            .env(ROLE, "")
-            .env("ROHRPOST_DIR", scratch)
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .exec();
-        Err(Failure::of("a module", error))
-    })
-}
-
 /// Gives a module, which is that process, its commands, one after the other.
 fn command(
     scratch: &Path,
@@ -148,17 +114,7 @@ fn command(
     samples: &Samples,
 ) -> Done<Arc<Node>> {
     settle(End::Ping, event.placement(), Scheduling::Fifo)?;
-    let installation = Installation::load(config)?;
-    let node = await_node(&path_in(scratch, &installation))?;
-    let tool = ToolLink::join(&installation, &node, NODE, ANSWER_WITHIN)?;
-    let motor = MotorProxy::new(&Caller::from(tool.link), MOTOR).with_timeout(ANSWER_WITHIN);
-    let deadline = Instant::now() + READY_WITHIN;
-    while let Err(error) = motor.halt() {
-        if Instant::now() > deadline {
-            return Err(error.into());
-        }
-        std::thread::sleep(LOOK_EACH);
-    }
+    let (node, motor) = reach_motor(scratch, config)?;
     for _ in 0..warm_up {
         event.before_each();
         motor.drive(0.5, 0.25)?;
@@ -181,60 +137,5 @@ fn check(node: &Node, has_journal: bool) -> Done<()> {
         Some(1..) if has_journal => Ok(()),
         None if !has_journal => Ok(()),
         written => Err(format!("records of the journal: {written:?}").into()),
-    }
-}
-
-/// The module makes its node.
-fn await_node(path: &Path) -> Done<Arc<Node>> {
-    let deadline = Instant::now() + READY_WITHIN;
-    loop {
-        match Node::open(path) {
-            Ok(node) => return Ok(node),
-            Err(error) if Instant::now() > deadline => return Err(error.into()),
-            Err(_) => std::thread::sleep(LOOK_EACH),
-        }
-    }
-}
-
-/// Where the node lies when `ROHRPOST_DIR` is `base`.
-fn path_in(base: &Path, installation: &Installation) -> PathBuf {
-    let file = node_directory(&installation.name, NODE);
-    base.join(file.file_name().unwrap_or_default())
-}
-
-/// If this process was started as the module: runs it until it is killed.
-pub(in crate::cases) fn run_hidden_module() -> Option<Result<(), Failure>> {
-    std::env::var_os(ROLE)?;
-    let ended = Start::from_environment().and_then(run_started::<CommandedMotor>);
-    Some(ended.map_err(|error| Failure::of("the module", error)))
-}
-
-/// Does nothing else.
-struct CommandedMotor {
-    speed_m_s: f64,
-}
-
-impl Module for CommandedMotor {
-    type Settings = NoSettings;
-    type Interfaces = MotorInterface;
-
-    fn new(_: NoSettings, _: &mut Context) -> Result<Self, ModuleError> {
-        Ok(Self { speed_m_s: 0.0 })
-    }
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NoSettings {}
-
-impl Motor for CommandedMotor {
-    fn drive(&mut self, speed_m_s: f64, _: f64) -> Result<(), DriveError> {
-        self.speed_m_s = speed_m_s;
-        Ok(())
-    }
-
-    fn halt(&mut self) -> Result<(), DriveError> {
-        self.speed_m_s = 0.0;
-        Ok(())
     }
 }

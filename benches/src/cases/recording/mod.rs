@@ -8,8 +8,6 @@ mod recorder;
 mod replayed;
 mod workload;
 
-pub(super) use journal::run_hidden_module;
-
 use super::Case;
 use crate::harness::{Failure, Scratch, sample_in_child};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};

@@ -66,21 +66,27 @@ impl Case for TcpHop {
     }
 }
 
-/// What all turns of a case share.
-struct TcpSegment {
+/// Two systems at a TCP router, and a module on each: what all turns of a case share.
+pub(in crate::cases) struct TcpSegment {
     /// None without the command, or if it does not start: then the others still have figures.
     systems: Result<Systems, Failure>,
     turns: Counter<u8>,
 }
 
 impl TcpSegment {
-    fn start(settings: &Settings, security: Security) -> Self {
+    pub(in crate::cases) fn start(settings: &Settings, security: Security) -> Self {
         let systems = Systems::start(settings, security).and_then(Systems::with_clients);
         Self { systems, turns: Counter::new(0) }
     }
 
-    fn time(&self, cell: &Cell) -> Result<Vec<f64>, Failure> {
-        let systems = self.systems.as_ref().map_err(Clone::clone)?;
+    /// The systems, if they started.
+    pub(in crate::cases) fn systems(&self) -> Result<&Systems, Failure> {
+        self.systems.as_ref().map_err(Clone::clone)
+    }
+
+    /// One way from module to module, µs.
+    pub(in crate::cases) fn time(&self, cell: &Cell) -> Result<Vec<f64>, Failure> {
+        let systems = self.systems()?;
         let turn = self.turns.get();
         self.turns.set(turn.wrapping_add(1));
         time_two_processes(cell, |end, meetings| {

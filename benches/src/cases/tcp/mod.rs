@@ -4,6 +4,9 @@ mod clients;
 mod hop;
 mod idle;
 
+#[cfg(feature = "languages")]
+pub(super) use hop::TcpSegment;
+
 use super::Case;
 
 /// All cases, in the order in which they are measured.

@@ -1,0 +1,69 @@
+"""Writes pictures in place as one module, reads them in place as another. Arguments: width, height, configuration."""
+
+import os
+import signal
+import time
+
+import rohrpost as rp
+
+from ping_pong import Turn, ends_when_it_fails
+from pictures import Pictures
+
+turn = Turn()
+pictures = Pictures(turn)
+
+
+class Camera(rp.Module, klass="camera"):
+    """Sees."""
+
+    def __init__(self) -> None:
+        self.number = 0
+        width, height = pictures.width, pictures.height
+        self.picture = rp.Image(width, height, width, rp.ImageFormat.Gray8, b"")
+
+    @rp.stream(1)
+    def image(self) -> rp.Image:
+        """What it sees."""
+
+    @rp.every(0.001)
+    @ends_when_it_fails
+    def see(self) -> None:
+        line = pictures.line_of(self.number)
+        with self.begin("image", self.picture, pictures.bytes) as pixels:
+            pixels[pictures.begin : pictures.begin + len(line)] = line
+        self.number += 1
+        if pictures.is_over:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+
+class Looker(rp.Module, klass="looker"):
+    """Looks."""
+
+    def __init__(self) -> None:
+        self.images, self.last = None, -1
+
+    @rp.every(0.002)
+    @ends_when_it_fails
+    def look(self) -> None:
+        if self.images is None:
+            try:
+                self.images = self.stream("camera.0", "image")
+            except rp.RohrpostError:
+                return  # It is not there yet.
+        sent_ns = time.monotonic_ns()
+        try:
+            with self.images.newest() as record:
+                mean = pictures.mean(record.value.pixels)
+                sequence = record.sequence
+        except rp.NoRecord:
+            return
+        back_ns = time.monotonic_ns()
+        if sequence == self.last:
+            return
+        self.last = sequence
+        if not pictures.took(sent_ns, back_ns, mean, sequence):
+            os.kill(os.getpid(), signal.SIGTERM)
+
+
+role, name = (Looker, "looker.0") if turn.is_ping else (Camera, "camera.0")
+rp.run(role, ["--config", turn.own[2], "--name", name])

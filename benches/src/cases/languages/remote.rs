@@ -1,0 +1,99 @@
+//! A call from Python, without anything of Rohrpost but the client that is Python alone, through the TCP router to a
+//! module in Rust.
+//!
+//! ```text
+//!  processor 0                              processor 1
+//!  Python               ═══ TCP ══▶ TCP router ═══ TCP ══▶ client of node ─▶ module    Python
+//!  Python               ═══ TCP ══▶ Python                                             sockets …
+//!  module ─▶ client     ═══ TCP ══▶ TCP router ═══ TCP ══▶ client of node ─▶ module    … + hop
+//! ```
+//! All of them there and back again.
+
+use super::{BYTES, at_most, cell};
+use crate::cases::Case;
+use crate::cases::tcp::TcpSegment;
+use crate::harness::{Cell, Child, End, Failure, Scratch, time_one_program, time_two_programs};
+use crate::languages::Interpreter;
+use crate::motor::start_motor;
+use crate::rounds::{Contender, Row, Subject, compare};
+use crate::settings::Settings;
+use crate::statistics::{Summary, median};
+use crate::tcp::systems::{Security, free_address, system_of};
+use std::cell::RefCell;
+
+/// Ratio to both parts together.
+const OF_PARTS: f64 = 1.5;
+
+/// All cases of this file.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    vec![Box::new(RemoteCall)]
+}
+
+struct RemoteCall;
+
+impl Case for RemoteCall {
+    fn name(&self) -> String {
+        "Python, remote call".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let (cell, python) = (cell(settings), Interpreter::of(settings));
+        let (segment, parts) = (TcpSegment::start(settings, Security::None), Parts::default());
+        let motor = segment
+            .systems()
+            .and_then(|systems| start_motor(&systems.folder(), &systems.configuration(End::Pong), cell.placement));
+        let contenders = [
+            Contender::sampled("Python", || call(&cell, &python, &segment, &motor)),
+            Contender::single("sockets + hop", || parts.time(&cell, &python, &segment)),
+        ];
+        let subject = Subject { case: self.name(), bytes: None, unit: "us" };
+        let mut rows = compare(settings, &subject, &contenders, &[at_most(contenders[1].name, OF_PARTS)]);
+        rows.extend(parts.rows(&subject));
+        Ok(rows)
+    }
+}
+
+/// Microseconds of each call.
+fn call(
+    cell: &Cell,
+    python: &Interpreter,
+    segment: &TcpSegment,
+    motor: &Result<Child, Failure>,
+) -> Result<Vec<f64>, Failure> {
+    let (systems, scratch) = (segment.systems()?, Scratch::new()?);
+    motor.as_ref().map_err(Clone::clone)?;
+    python.require("rohrpost.remote")?;
+    let (address, digests) = (systems.address().to_string(), format!("{:016x}-{:016x}", systems.common(), 0));
+    let module = format!("{}.200.0.0", system_of(End::Pong));
+    time_one_program(cell, &scratch, &python.runs("remote_call.py", &[&address, &digests, &module]))
+}
+
+/// What such a call consists of at least: medians of each round.
+#[derive(Default)]
+struct Parts {
+    sockets: RefCell<Vec<f64>>,
+    hops: RefCell<Vec<f64>>,
+}
+
+impl Parts {
+    /// Both together, there and back again, µs.
+    fn time(&self, cell: &Cell, python: &Interpreter, segment: &TcpSegment) -> Result<f64, Failure> {
+        let middle = |samples: Vec<f64>| median(samples).ok_or_else(|| Failure::Failed("not one sample".into()));
+        python.require("socket")?;
+        let (address, scratch) = (free_address()?.to_string(), Scratch::new()?);
+        let socket = middle(time_two_programs(cell, &scratch, |_| python.runs("sockets.py", &[&address]))?)?;
+        let hop = 2.0 * middle(segment.time(cell)?)?;
+        self.sockets.borrow_mut().push(socket);
+        self.hops.borrow_mut().push(hop);
+        Ok(socket + hop)
+    }
+
+    fn rows(&self, subject: &Subject) -> Vec<Row> {
+        let subject = Subject { bytes: Some(BYTES), ..subject.clone() };
+        let row = |name, figures: &RefCell<Vec<f64>>| {
+            let middle = median(figures.borrow().iter().copied())?;
+            Some(Row::alone(subject.clone(), name, Ok(Summary::single(middle))))
+        };
+        [row("sockets", &self.sockets), row("hop", &self.hops)].into_iter().flatten().collect()
+    }
+}
