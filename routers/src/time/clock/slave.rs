@@ -11,8 +11,8 @@ use crate::time::{Exchange, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
 /// Samples that a slave needs before it trusts them, and before it is content.
 const SAMPLES_MIN: u32 = 4;
 const SAMPLES_EAGER: u32 = 8;
-/// A slave answers a Sync at most this late, in time slots a cycle if that is longer: meanwhile its clock drifts from the
-/// master's.
+/// A slave answers a Sync at most this late, in time slots a cycle if that is longer: meanwhile its clock drifts from
+/// the master's.
 const ANSWER_NS_MAX: u64 = 50_000_000;
 /// A slave corrects its offset within this time, or four exchanges.
 const SERVO_NS_MIN: u64 = 250_000_000;

@@ -31,8 +31,8 @@ pub const PORT: Port = 1;
 const DOUBT_NS: u32 = 100;
 /// Two clocks are read one after the other.
 const APART_NS: u64 = 300;
-/// Stamps that are waited for at a time: a kernel's queue of errors takes as much memory as the socket's receive buffer,
-/// 212 992 bytes by default, and some 770 for each. A master in time slots sends to all nodes in one window.
+/// Stamps that are waited for at a time: a kernel's queue of errors takes as much memory as the socket's receive
+/// buffer, 212 992 bytes by default, and some 770 for each. A master in time slots sends to all nodes in one window.
 const AWAITED_MAX: usize = 256;
 
 /// What one incarnation of a router's time is configured with.
