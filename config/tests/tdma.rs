@@ -176,7 +176,7 @@ fn of_replicas_that_do_not_fit_together_the_less_important_is_refused_whatever_t
     let [plan, turns] = [0, 1].map(|at: usize| replica(streams[at], left[at].unwrap() / 1.5));
     for all in [[&plan, &turns], [&turns, &plan]] {
         let errors = Installation::parse(&[head.as_str(), all[0], all[1]].concat(), Path::new("robot.toml"));
-        let errors = errors.err().expect("both do not fit").to_string();
+        let errors = errors.expect_err("both do not fit").to_string();
         let is_plan = errors.contains("of `pilot.1/plan`") && errors.contains("and more important replicas");
         assert!(is_plan && errors.trim().lines().count() == 1, "{errors}");
     }
