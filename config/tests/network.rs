@@ -191,3 +191,15 @@ fn nodes_beyond_the_lan_count_as_well() {
     assert!(said(64).contains(many), "{}", said(64));
     assert!(!said(63).contains("a system has at most"), "{}", said(63));
 }
+
+#[test]
+fn sixty_four_replicas_are_taken_and_one_more_is_not() {
+    let with = |count: usize| {
+        let replica = |at: usize| format!("[[replica]]\nstream = \"motor.0/s{at}\"\nto = [\"desk\"]\n");
+        let text = include_str!("two_nodes.toml").to_owned() + &(0..count).map(replica).collect::<String>();
+        Installation::parse(&text, Path::new("two_nodes.toml")).map(|installation| installation.replicas.len())
+    };
+    assert_eq!(with(64).unwrap_or_else(|errors| panic!("{errors}")), 64);
+    let errors = with(65).expect_err("65 are too many").to_string();
+    assert!(errors.contains("there are more than 64; drop some") && errors.trim().lines().count() == 1, "{errors}");
+}

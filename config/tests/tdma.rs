@@ -162,6 +162,26 @@ fn programs_get_the_records_that_check_prints() {
     }
 }
 
+/// Alone each takes two thirds of what slots leave.
+#[test]
+fn of_replicas_that_do_not_fit_together_the_less_important_is_refused_whatever_their_order() {
+    let (head, _) = include_str!("broken/replica-slots.toml").split_once("[[replica]]").unwrap();
+    let head = format!("{head}[[module]]\nname = \"pilot.1\"\nnode = \"base\"\nprogram = \"./pilot\"\n");
+    let replica = |stream: &str, rate: f64| {
+        format!("[[replica]]\nstream = {{ name = \"{stream}\", rate = {rate:.2} }}\nto = [\"brain\"]\n")
+    };
+    let streams = ["pilot.1/plan", "motor.0/turns"];
+    let seldom = streams.map(|stream| replica(stream, 0.01)).concat();
+    let left = records_left(&parse(&[head.as_str(), &seldom].concat()));
+    let [plan, turns] = [0, 1].map(|at: usize| replica(streams[at], left[at].unwrap() / 1.5));
+    for all in [[&plan, &turns], [&turns, &plan]] {
+        let errors = Installation::parse(&[head.as_str(), all[0], all[1]].concat(), Path::new("robot.toml"));
+        let errors = errors.expect_err("both do not fit").to_string();
+        let is_plan = errors.contains("of `pilot.1/plan`") && errors.contains("and more important replicas");
+        assert!(is_plan && errors.trim().lines().count() == 1, "{errors}");
+    }
+}
+
 /// Useless tables: each is refused with a message, or has bounds, but nothing overflows or loops forever.
 #[test]
 fn absurd_flows_are_checked_in_time() {

@@ -1,21 +1,25 @@
 //! Both halves, over a wire in memory: with the outbound and the inbound that ship, and rings of two nodes.
 
 mod asked;
+mod asking;
 mod by_line;
 mod changed;
 mod damaged;
 mod hops;
 mod hostile;
 mod joining;
+mod lives;
 mod lossy;
 mod older;
 mod requests;
 mod sealed;
 mod slow;
 mod stepped;
+mod turns;
 mod two_hops;
 
 use super::{Describe, ReceivedReplica, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
+use crate::counts::Count;
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
 use crate::harness::{MS, START, address, settings};
 use crate::inbound::{Datagram, Inbound};
@@ -274,6 +278,10 @@ fn records_arrive_as_they_were_written() {
         assert_eq!(told(record.info()), told(there.0));
     }
     assert_eq!((holder.records(), reader.accounts()), (6, (6, 0)));
+    let (sent, received) = (&origin.router.sender.counts()[0], holder.counts());
+    let bytes = 1 + 1372 + 1373 + 6000 + 17;
+    assert_eq!((sent.records.get(), sent.bytes.get(), received.bytes.get()), (6, bytes, bytes));
+    assert_eq!([&received.completed, &received.asked, &received.gaps, &sent.again].map(Count::get), [0; 4]);
     assert_eq!(holder.ground.node.about(CAMERA), Some(words(1)), "its readers know what they read");
     assert!(ReplicaLoss::ALL.iter().all(|cause| holder.lost(*cause) == 0));
 }

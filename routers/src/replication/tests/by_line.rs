@@ -148,10 +148,29 @@ fn what_leaves_is_held_and_a_new_connection_begins_with_the_newest() {
         end.left(line.now_ns, LAPTOP);
         end.left(line.now_ns, SERVER);
     }
+    assert_eq!(line.here.readers().count(), 0, "nobody is woken for it");
     line.write(&[&[4; 6000]]);
     assert_eq!(line.carry(), [], "nothing leaves without a connection");
     line.here.came(line.now_ns, LAPTOP);
     assert_eq!(line.carry(), [42]);
     let received = line.there.counts().received[0].clone();
     assert_eq!((received.records.get(), received.lost.of(ReplicaLoss::Incomplete)), (3, 1));
+    // What has left is held no more.
+    for _ in 0..40 {
+        line.write(&[&[5; 6000]]);
+    }
+    assert!(line.here.readers().all(|reader| reader.record(42).is_none()));
+}
+
+#[test]
+fn before_packages_leaves_only_what_is_more_important() {
+    let mut line = Line::new(image());
+    line.carry();
+    line.write(&[b"picture"]);
+    line.here.refresh(line.now_ns);
+    let mut content = [0; LINE_PART_ROOM];
+    for (level, leaves) in [(0, false), (18, false), (19, true)] {
+        let part = line.here.next_before(line.now_ns, (LAPTOP, level), &mut content);
+        assert_eq!(part.is_some(), leaves, "before packages of level {level}");
+    }
 }

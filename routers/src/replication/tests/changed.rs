@@ -1,6 +1,7 @@
 //! Only what has changed is sent: what is left out has the bytes of what is there.
 
 use super::super::destination::UNCHANGED_EVERY_NS;
+use super::requests::{ask, request};
 use super::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -81,6 +82,32 @@ fn what_may_not_have_arrived_goes_again() {
         origin.look();
     };
     arrives("there is another interface, so its ring is made anew", &mut now_ns, [1, 0, 0], &described);
+}
+
+#[test]
+fn what_was_overwritten_before_all_of_it_came_goes_again() {
+    let mut origin = Origin::new(&[changes(Sampling::Each)]);
+    let (mut now_ns, mut writer) = (START, origin.writer(ID, SHAPE));
+    origin.leave(&mut now_ns);
+    let mut write = |records: u64| {
+        for _ in 0..records {
+            writer.write(at(100), &[7; 6000]).unwrap();
+        }
+    };
+    let sequences = |left: Vec<Vec<u8>>| left.iter().map(|datagram| datagram[56]).collect::<Vec<_>>();
+    write(1);
+    assert!(origin.router.poll(now_ns + MS).is_ok(), "its first part");
+    // The ring turns.
+    write(20);
+    assert_eq!(sequences(origin.leave(&mut now_ns)), [20; 5], "nobody else has what it says");
+    write(20);
+    assert_eq!(sequences(origin.leave(&mut now_ns)), [0; 0]);
+    assert!(ask(&mut origin, HOLDER, request(20, &[1])));
+    assert_eq!(sequences(origin.leave(&mut now_ns)), [0; 0]);
+    write(1);
+    assert_eq!(sequences(origin.leave(&mut now_ns)), [41; 5]);
+    let causes = [ReplicaLoss::Overwritten, ReplicaLoss::Passed, ReplicaLoss::Sampled];
+    assert_eq!(causes.map(|cause| origin.lost(cause)), [1, 39, 1], "of twenty at once the newest is looked at");
 }
 
 /// Whatever is left out for whichever node, each has the bytes of the newest.

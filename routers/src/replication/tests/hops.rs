@@ -48,7 +48,7 @@ fn installation(writer: NodeIndex, to: &[NodeIndex]) -> Installation {
     let to: Vec<&str> = to.iter().map(|node| NODES[usize::from(*node)]).collect();
     let text = format!(
         "{TEXT}[[module]]\nname = \"camera.0\"\nnode = \"{}\"\nbuiltin = \"sim\"\n[[replica]]\nstream = {{ name = \
-         \"camera.0/image\", every = 3 }}\nto = {to:?}\n",
+         \"camera.0/image\", every = 3 }}\nchanged = true\nto = {to:?}\n",
         NODES[usize::from(writer)]
     );
     Installation::parse(&text, Path::new("test.toml")).unwrap_or_else(|errors| panic!("{errors}"))
@@ -57,7 +57,9 @@ fn installation(writer: NodeIndex, to: &[NodeIndex]) -> Installation {
 /// From where to where, and whether records are left out there.
 fn hop(replica: &ReplicaSettings) -> Option<(NodeIndex, Vec<NodeIndex>, bool)> {
     let to: Vec<NodeIndex> = (0..64).filter(|node| replica.to & 1 << node != 0).collect();
-    (!to.is_empty()).then(|| (replica.node, to, replica.sampling != Sampling::Each))
+    let leaves_out = replica.sampling != Sampling::Each;
+    assert_eq!(replica.changed, leaves_out, "both are where it is written");
+    (!to.is_empty()).then_some((replica.node, to, leaves_out))
 }
 
 #[test]

@@ -38,12 +38,20 @@ pub(super) fn take_of(holder: &mut Holder, now_ns: u64, incarnation: u64, part: 
     holder.router.receiver.take(now_ns, || time(now_ns), &head, &ReplicaFrame::Record(part))
 }
 
+/// A description comes, in one part.
+pub(super) fn describe(holder: &mut Holder, generation: u16, incarnation: u64, words: &[u8]) {
+    let (check, len) = (crc32fast::hash(words), words.len() as u32);
+    let part = DescriptionPart { place: 0, generation, check, len, offset: 0, written: 0, bytes: words };
+    let head = FrameHead { incarnation, ..head(ORIGIN) };
+    assert!(holder.router.receiver.take(START, || time(START), &head, &ReplicaFrame::Description(part)));
+}
+
 /// A replica's node that knows the description.
 pub(super) fn described() -> Holder {
     described_by(image())
 }
 
-fn described_by(replica: ReplicaSettings) -> Holder {
+pub(super) fn described_by(replica: ReplicaSettings) -> Holder {
     let replicas = [replica];
     let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
     let mut now_ns = START;
@@ -93,6 +101,11 @@ fn a_record_of_which_a_part_never_comes_is_left_out() {
     assert_eq!(read(&mut reader), (vec![(4, 5), (6, 5)], 1));
     let lost = [ReplicaLoss::Incomplete, ReplicaLoss::Duplicate].map(|cause| holder.lost(cause));
     assert_eq!((lost, holder.counts().gaps.get()), ([1, 1], 1));
+    // However many of them there are in a row.
+    (7..50).for_each(|sequence| assert!(take(&mut holder, ORIGIN, first(sequence))));
+    assert!(take(&mut holder, ORIGIN, RecordPart { sequence: 50, ..part(b"newer") }));
+    assert_eq!(read(&mut reader), (vec![(50, 5)], 43));
+    assert_eq!((holder.lost(ReplicaLoss::Incomplete), holder.counts().gaps.get()), (44, 44));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The older of two open records: when it holds up the newer one, and when it does no more.
 
-use super::hostile::{described, part, take_of};
+use super::hostile::{describe, described, part, take_of};
 use super::*;
 use crate::frame::RecordPart;
 
@@ -55,4 +55,56 @@ fn one_for_which_no_frame_is_free_holds_up_nothing() {
     assert!(take_of(&mut holder, START, 100, RecordPart { step: 0, ..whole(30) }));
     assert_eq!((newest(&holder), holder.lost(ReplicaLoss::Incomplete)), (Some(32), 1));
     drop(held);
+}
+
+#[test]
+fn of_one_that_was_given_up_what_comes_is_late() {
+    let mut holder = described();
+    assert!(take_of(&mut holder, START, 100, first(4, 100)));
+    assert!(take_of(&mut holder, START + 150 * MS, 100, first(5, 101)));
+    assert!(holder.router.receiver.must_ring(), "by the newer one it is known what is missing");
+    holder.pass(START + 199 * MS);
+    assert!(holder.router.receiver.must_ring(), "it is asked for again");
+    assert_eq!(holder.lost(ReplicaLoss::Incomplete), 0);
+    holder.pass(START + 200 * MS);
+    assert_eq!(holder.lost(ReplicaLoss::Incomplete), 1, "nothing came of it for the deadline");
+    let rest = |sequence, stamp_ns| RecordPart { offset: 1372, bytes: &FULL[..628], ..first(sequence, stamp_ns) };
+    let now_ns = START + 201 * MS;
+    assert!(take_of(&mut holder, now_ns, 100, rest(4, 100)) && take_of(&mut holder, now_ns, 100, rest(5, 101)));
+    assert_eq!((newest(&holder), holder.lost(ReplicaLoss::Late)), (Some(5), 1));
+}
+
+#[test]
+fn one_that_is_given_up_gives_its_frame_back() {
+    let mut holder = described();
+    // More of them than the ring has frames.
+    for sequence in 0..50 {
+        let now_ns = START + sequence * 300 * MS;
+        assert!(take_of(&mut holder, now_ns, 100, first(2 * sequence, 100)));
+        assert!(take_of(&mut holder, now_ns, 100, RecordPart { sequence: 2 * sequence + 1, ..part(b"whole") }));
+        holder.pass(now_ns + 250 * MS);
+        assert_eq!(newest(&holder), Some(2 * sequence + 1));
+    }
+    let causes = [ReplicaLoss::Incomplete, ReplicaLoss::Late, ReplicaLoss::Unwritable].map(|cause| holder.lost(cause));
+    assert_eq!(causes, [50, 0, 0]);
+}
+
+#[test]
+fn both_are_given_up_with_their_description() {
+    let mut holder = described();
+    assert!(take_of(&mut holder, START, 100, first(4, 100)) && take_of(&mut holder, START, 100, first(5, 101)));
+    describe(&mut holder, 0, 100, &words(2));
+    assert_eq!((newest(&holder), holder.lost(ReplicaLoss::Incomplete)), (None, 2));
+}
+
+#[test]
+fn one_that_does_not_come_holds_up_the_newer_for_an_answer_and_no_longer() {
+    let mut holder = described();
+    let whole = |sequence| RecordPart { sequence, step: 1, ..part(b"whole") };
+    assert!(take_of(&mut holder, START, 100, RecordPart { step: 0, ..whole(4) }));
+    assert!(take_of(&mut holder, START, 100, whole(6)));
+    for (after_ns, there, incomplete) in [(0, 4, 0), (10 * MS - 1, 4, 0), (10 * MS + MS / 2, 6, 1)] {
+        holder.pass(START + after_ns);
+        assert_eq!((newest(&holder), holder.lost(ReplicaLoss::Incomplete)), (Some(there), incomplete), "{after_ns}");
+    }
 }

@@ -2,19 +2,19 @@
 
 use super::super::requests::OutgoingRequest;
 use super::*;
-use crate::frame::{FrameKind, PART_REQUEST_BYTES_MAX, PartRequest, PartRequestBytes};
+use crate::frame::{Frame, FrameKind, PART_REQUEST_BYTES_MAX, PartRequest, PartRequestBytes};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// For these parts of a record of this sequence.
-fn request(sequence: u64, indices: &[usize]) -> PartRequest {
+pub(super) fn request(sequence: u64, indices: &[usize]) -> PartRequest {
     let mut parts = [0; 16];
     indices.iter().for_each(|index| parts[index / 64] |= 1 << (index % 64));
     PartRequest { place: 0, generation: 0, first: 0, router: 100, sequence, parts }
 }
 
 /// Hands a request over; whether it was not refused.
-fn ask(origin: &mut Origin, from: NodeIndex, request: PartRequest) -> bool {
+pub(super) fn ask(origin: &mut Origin, from: NodeIndex, request: PartRequest) -> bool {
     let kind = FrameKind::PartRequest;
     let head = FrameHead { kind, system: 1, from, to: ORIGIN, digest: 7, incarnation: 101, sequence: 0 };
     let mut bytes = [0; PART_REQUEST_BYTES_MAX];
@@ -44,8 +44,15 @@ fn parts_that_are_asked_for_leave_before_new_ones() {
     writer.write(at(200), &[9; 6000]).unwrap();
     assert!(ask(&mut origin, HOLDER, request(1, &[4])) && ask(&mut origin, HOLDER, request(0, &[1, 3])));
     let sequence = |datagram: &[u8]| (datagram[56], u32::from_le_bytes(*datagram[52..].first_chunk().unwrap()) / 1372);
-    let left: Vec<(u8, u32)> = origin.leave(&mut now_ns).iter().map(|datagram| sequence(datagram)).collect();
+    let step = |datagram: &[u8]| match Frame::parse(datagram) {
+        Ok((_, Frame::Replica(ReplicaFrame::Record(part)))) => part.step,
+        _ => panic!("it is a part of a record"),
+    };
+    let all = origin.leave(&mut now_ns);
+    let left: Vec<(u8, u32)> = all.iter().map(|datagram| sequence(datagram)).collect();
     assert_eq!(left, [(0, 1), (0, 3), (1, 4), (2, 0), (2, 1), (2, 2), (2, 3), (2, 4)]);
+    let steps: Vec<u32> = all.iter().map(|datagram| step(datagram)).collect();
+    assert_eq!(steps, [0, 0, 0, 1, 1, 1, 1, 1], "those say nothing of what was sent before");
     assert_eq!(again(&origin), 3);
 }
 
@@ -68,6 +75,7 @@ fn requests_that_cannot_be_answered_are_refused_and_counted() {
         assert!(origin.leave(&mut now_ns).is_empty(), "{request:?}");
         assert_eq!(origin.lost(cause), before + 1, "{request:?}");
     }
+    assert!(origin.router.receiver.must_ring(), "the thread that sends looks at each");
     // The ring keeps 16 records, and the last 32 that were sent may be asked for.
     for step in 4..30 {
         writer.write(at(100 + step), &[9; 6000]).unwrap();
@@ -192,4 +200,17 @@ fn of_a_record_larger_than_its_replica_no_part_is_sent_again_for_which_there_is_
     assert!(origin.leave(&mut now_ns).is_empty());
     assert_eq!((origin.lost(ReplicaLoss::OutOfRange), again(&origin)), (1, 0));
     assert!(ask(&mut origin, HOLDER, request(0, &[1])) && origin.leave(&mut now_ns).len() == 1);
+}
+
+/// Each node asks for what it has.
+#[test]
+fn a_node_with_another_replica_may_not_ask_for_this_one() {
+    const POSE: Name = Name::new(1, 240, 0, 0);
+    let mut origin = Origin::new(&[image(), ReplicaSettings { from: POSE, to: 1 << 2, ..image() }]);
+    let asked = [(2, 0), (HOLDER, 1), (ORIGIN, 0), (HOLDER, 0), (2, 1)];
+    let taken = asked.map(|(from, place)| {
+        let taken = ask(&mut origin, from, PartRequest { place, ..request(0, &[0]) });
+        (taken, origin.router.receiver.must_ring())
+    });
+    assert_eq!(taken, [(false, false), (false, false), (false, false), (true, true), (true, true)]);
 }

@@ -42,6 +42,10 @@ struct Stepped {
     by_ns: i64,
     /// Its node has begun another epoch, as a router does that starts with such a clock.
     epoch: u64,
+    /// The epoch of stamps then.
+    stamped: u64,
+    /// How far off it is at most, as its node says, ns.
+    error_ns: u64,
 }
 
 /// Writes records for two seconds, and sets the clock after one: sequences that were read, lines of output, and records
@@ -57,11 +61,12 @@ fn stepped(stepped: Stepped) -> (Vec<u64>, u64, u64) {
             let now_ns = START + 10 * S + step * EVERY_NS;
             let is_set = step * EVERY_NS >= S;
             let (by_ns, epoch) = if is_set { (stepped.by_ns, stepped.epoch) } else { (0, 1) };
+            let error = Duration::from_nanos(stepped.error_ns);
             // The record's own moment is written a moment ago, by the monotonic clock of the computer that tests.
-            let system = |_: u64| SystemTime { ns: now_ns.saturating_add_signed(by_ns), epoch, ..time(now_ns) };
-            let stamp = match epoch {
+            let system = |_: u64| SystemTime { ns: now_ns.saturating_add_signed(by_ns), epoch, error, ..time(now_ns) };
+            let stamp = match if is_set { stepped.stamped } else { 1 } {
                 1 => at(now_ns),
-                _ => Stamp { epoch, ns: system(now_ns).ns },
+                epoch => Stamp { epoch, ns: system(now_ns).ns },
             };
             writer.write(stamp, &[step as u8; 64]).unwrap();
             origin.router.stats.peer(HOLDER).link.heard_ns.set(now_ns);
@@ -84,11 +89,18 @@ fn stepped(stepped: Stepped) -> (Vec<u64>, u64, u64) {
 fn a_writers_clock_that_is_set_back_by_a_second_stops_no_record_and_is_told_once() {
     let records = 2 * S / EVERY_NS;
     // Its node takes some time to find that out: meanwhile each record seems to have been on its way for a second.
-    let (sequences, lines, late) = stepped(Stepped { by_ns: -1_000_000_000, epoch: 1 });
+    let back = Stepped { by_ns: -1_000_000_000, epoch: 1, stamped: 1, error_ns: 10_000 };
+    let (sequences, lines, late) = stepped(back);
     assert!(sequences.into_iter().eq(0..records), "each record is read, in order");
     assert_eq!((lines, late), (1, records / 2), "all are counted, and one line tells of them in a second");
     // Times of two epochs are not compared, though the stamps go back by a second.
-    let (sequences, lines, late) = stepped(Stepped { by_ns: -1_000_000_000, epoch: 2 });
-    assert!(sequences.into_iter().eq(0..records));
-    assert_eq!((lines, late), (0, 0));
+    for (set, why) in [
+        (Stepped { epoch: 2, stamped: 2, ..back }, "its modules know that"),
+        (Stepped { epoch: 2, ..back }, "its modules do not know that yet"),
+        (Stepped { error_ns: S, ..back }, "its node says that it may be"),
+    ] {
+        let (sequences, lines, late) = stepped(set);
+        assert!(sequences.into_iter().eq(0..records), "{why}");
+        assert_eq!((lines, late), (0, 0), "{why}");
+    }
 }
