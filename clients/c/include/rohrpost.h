@@ -1018,8 +1018,8 @@ rohrpost_code rohrpost_module_follow(const char *module,
                                      uint64_t period_ns,
                                      uint32_t *follow);
 
-// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0, and
-// `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
+// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0,
+// and `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
 // `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
 //
 // Pointers:
