@@ -226,6 +226,7 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
         (!is_early).then_some(said)
     });
     assert!(checked.ok().contains(r#"{\"list\":[1,2],\"name\":\"it\"}"#), "settings, without parameters");
+    assert_eq!(robot.state("asker.0"), "on", "what it opens besides is not taken for it");
     let records = place.say(&["stream", "read", "asker.0", "1", "--from", "0"]).ok();
     let bodies: Vec<&str> = records.lines().map(|line| line.rsplit_once("  ").unwrap().1).collect();
     let expected = [

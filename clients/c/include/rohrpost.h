@@ -1037,7 +1037,9 @@ rohrpost_code rohrpost_module_finish(uint64_t *sequence);
 // Gives up the record that is begun; nothing is written.
 rohrpost_code rohrpost_module_abandon(void);
 
-// Takes part in the node that launch has started this process on, as its module. The environment says which.
+// Takes part in the node that launch has started this process on; the environment says which. The module itself takes
+// part by `rohrpost_module_run`, so this is for what it does besides: without a name, as launch asks for one process
+// of a name.
 //
 // The caller owns the node, and closes it by `rohrpost_node_close`. A node belongs to the thread that opens it; each
 // thread opens its own, and takes one of the node's 256 places.
