@@ -226,18 +226,21 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
         (!is_early).then_some(said)
     });
     assert!(checked.ok().contains(r#"{\"list\":[1,2],\"name\":\"it\"}"#), "settings, without parameters");
+    assert_eq!(robot.state("asker.0"), "on", "what it opens besides is not taken for it");
     let records = place.say(&["stream", "read", "asker.0", "1", "--from", "0"]).ok();
     let bodies: Vec<&str> = records.lines().map(|line| line.rsplit_once("  ").unwrap().1).collect();
-    let expected = [
-        "{number: 7, bytes: [97, 98, 99]}",
-        "{number: 8, bytes: [120, 121]}",
-        "{number: 7, bytes: [122]}",
-    ];
+    let expected = ["{number: 7, bytes: [97, 98, 99]}", "{number: 8, bytes: [120, 121]}", "{number: 7, bytes: [122]}"];
     assert_eq!(bodies, expected, "{records}");
     let failed = place.say(&["call", "asker.0", "fail"]).fails();
     assert!(failed.contains("it does not say why"), "{failed}");
     assert_eq!(robot.state("asker.0"), "error");
-    stop(&place, robot, &mut launch);
+    // So launch ends with an error, once it knows.
+    let why = "asker.0 is in error: it does not say why";
+    wait("launch tells it", || (launch.out() + &launch.err()).contains(why).then_some(()));
+    drop(robot);
+    launch.signal(Signal::SIGINT);
+    assert_eq!(launch.end().code(), Some(1));
+    place.assert_empty();
 }
 
 #[test]

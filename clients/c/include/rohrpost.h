@@ -1018,8 +1018,8 @@ rohrpost_code rohrpost_module_follow(const char *module,
                                      uint64_t period_ns,
                                      uint32_t *follow);
 
-// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0, and
-// `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
+// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0,
+// and `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
 // `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
 //
 // Pointers:
@@ -1037,7 +1037,9 @@ rohrpost_code rohrpost_module_finish(uint64_t *sequence);
 // Gives up the record that is begun; nothing is written.
 rohrpost_code rohrpost_module_abandon(void);
 
-// Takes part in the node that launch has started this process on, as its module. The environment says which.
+// Takes part in the node that launch has started this process on; the environment says which. The module itself takes
+// part by `rohrpost_module_run`, so this is for what it does besides: without a name, as launch asks for one process
+// of a name.
 //
 // The caller owns the node, and closes it by `rohrpost_node_close`. A node belongs to the thread that opens it; each
 // thread opens its own, and takes one of the node's 256 places.

@@ -239,9 +239,10 @@ impl NativeModule for CModule<'_> {
     fn parameters_changed(&mut self, context: &mut NativeContext<'_>, changed: &[&str]) -> Result<(), ModuleError> {
         let names: Vec<CString> = changed.iter().filter_map(|name| CString::new(*name).ok()).collect();
         let pointers: Vec<*const c_char> = names.iter().map(|name| name.as_ptr()).collect();
-        // SAFETY: as above.
         let call = |table: &ModuleTable| {
-            table.parameters_changed.map(|tell| unsafe { tell(table.user, pointers.as_ptr(), pointers.len()) })
+            let tell = table.parameters_changed?;
+            // SAFETY: as above; the names outlive the call.
+            Some(unsafe { tell(table.user, pointers.as_ptr(), pointers.len()) })
         };
         self.call(context, call)
     }

@@ -134,6 +134,25 @@ static rohrpost_outcome records(void) {
     return ROHRPOST_OK;
 }
 
+// Beside the module's own part in the node, another one.
+static rohrpost_outcome beside(void) {
+    rohrpost_node node;
+    rohrpost_stream stream;
+    rohrpost_stream_reader reader;
+    rohrpost_record record;
+    char text[16];
+    DONE(rohrpost_node_open(&node));
+    DONE(rohrpost_name_parse(node, "asker.0", &stream.name));
+    DONE(rohrpost_name_text(node, stream.name, text, sizeof text));
+    HOLDS(strcmp(text, "asker.0") == 0);
+    stream.number = SMALL;
+    DONE(rohrpost_stream_reader_open(node, stream, &reader));
+    DONE(rohrpost_stream_newest(reader, &record));
+    HOLDS(record.len == 3 && memcmp(record.body, "\x07\x01z", 3) == 0);
+    DONE(rohrpost_stream_reader_close(reader));
+    return rohrpost_node_close(node);
+}
+
 static rohrpost_outcome command(void *user, uint16_t number, rohrpost_decoder *arguments, rohrpost_encoder *reply) {
     (void)user;
     if (number != CHECK_ALL) {
@@ -144,6 +163,7 @@ static rohrpost_outcome command(void *user, uint16_t number, rohrpost_decoder *a
     DONE(calls());
     DONE(own());
     DONE(records());
+    DONE(beside());
     char settings[100];
     GIVES(ROHRPOST_SMALL_BUFFER, rohrpost_module_settings(settings, 5));
     DONE(rohrpost_module_settings(settings, sizeof settings));

@@ -70,7 +70,12 @@ pub extern "C" fn rohrpost_module_now(now: Option<&mut MaybeUninit<TimeNow>>) ->
 /// Has `tick` called once in this time, ns, from now on.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_module_period(period_ns: u64) -> Code {
-    edge(|| with_context(|context| Ok(context.set_period(Duration::from_nanos(period_ns)))))
+    edge(|| {
+        with_context(|context| {
+            context.set_period(Duration::from_nanos(period_ns));
+            Ok(())
+        })
+    })
 }
 
 /// The settings that are no parameters, as an object in JSON, with a zero behind it. If the buffer is too small, the
