@@ -191,7 +191,7 @@ impl Case for Picture {
         let mut contenders = vec![
             Contender::sampled("Python", || self.turn(&cell, &python, (self.size, "image"))),
             Contender::sampled("iceoryx2", || self.iceoryx(&cell, &python)),
-            Contender::sampled("pixels alone", || self.turn(&cell, &python, (self.size, "bare"))),
+            Contender::sampled("Python, pixels alone", || self.turn(&cell, &python, (self.size, "bare"))),
         ];
         let mut versus = vec![at_most("iceoryx2", OF_PEERS)];
         if self.size != SIZES[0] {
