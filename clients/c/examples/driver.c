@@ -1,5 +1,5 @@
-// Drives nothing yet, but tells how far the wheels have turned: a microcontroller says it by a serial line, in counts of
-// both wheels, "left right\n", and this makes odometry of it.
+// Drives nothing yet, but tells how far the wheels have turned: a microcontroller says it by a serial line, in counts
+// of both wheels, "left right\n", and this makes odometry of it.
 
 #include <errno.h>
 #include <fcntl.h>

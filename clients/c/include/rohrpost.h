@@ -345,6 +345,16 @@ typedef uint8_t rohrpost_kind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// Reads values one behind the other. A value that is not there is 0, and all behind it.
+typedef struct rohrpost_decoder {
+  // What is not read yet.
+  const uint8_t *bytes;
+  // How many these are.
+  size_t left;
+  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is read.
+  int32_t state;
+} rohrpost_decoder;
+
 // A struct or a variant: `ROHRPOST_NAMED` writes it.
 typedef struct rohrpost_named {
   // A name that others may rely on; it counts in the hash.
@@ -439,6 +449,18 @@ typedef struct rohrpost_interface {
   size_t described_len;
 } rohrpost_interface;
 
+// Writes values one behind the other into bytes of the caller's.
+typedef struct rohrpost_encoder {
+  // Where they go.
+  uint8_t *bytes;
+  // Bytes that there are.
+  size_t room;
+  // Bytes that are written.
+  size_t len;
+  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is written.
+  int32_t state;
+} rohrpost_encoder;
+
 // A node that this thread takes part in.
 typedef struct rohrpost_node {
   // Which; 0 is none.
@@ -518,28 +540,6 @@ typedef struct rohrpost_parameter {
 // How a function of a module ends: a code. Below 0 it has failed, and the last error says why: that of the call that
 // failed, or what `rohrpost_fail` was given.
 typedef int32_t rohrpost_outcome;
-
-// Reads values one behind the other. A value that is not there is 0, and all behind it.
-typedef struct rohrpost_decoder {
-  // What is not read yet.
-  const uint8_t *bytes;
-  // How many these are.
-  size_t left;
-  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is read.
-  int32_t state;
-} rohrpost_decoder;
-
-// Writes values one behind the other into bytes of the caller's.
-typedef struct rohrpost_encoder {
-  // Where they go.
-  uint8_t *bytes;
-  // Bytes that there are.
-  size_t room;
-  // Bytes that are written.
-  size_t len;
-  // A code: how it went until now. Once it is not `ROHRPOST_OK`, nothing more is written.
-  int32_t state;
-} rohrpost_encoder;
 
 // Something that came of what a module follows.
 typedef struct rohrpost_followed {
@@ -712,8 +712,72 @@ typedef struct rohrpost_source {
 extern "C" {
 #endif // __cplusplus
 
-// The hash of an interface, by which callers and servers know that they have the same one, in whatever language each is
-// written. Any thread.
+// Begins to read values from `len` bytes.
+//
+// Pointers:
+// `bytes` is null, or points to `len` bytes, which stay as they are until all is read.
+struct rohrpost_decoder rohrpost_decode(const void *bytes, size_t len);
+
+// Whether all was read, and nothing is left; else `ROHRPOST_MALFORMED`.
+rohrpost_code rohrpost_decoded(const struct rohrpost_decoder *decoder);
+
+// Reads true or false; also whether an option has a value, which follows then.
+bool rohrpost_get_bool(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 8 bits.
+uint8_t rohrpost_get_u8(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 16 bits.
+uint16_t rohrpost_get_u16(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 32 bits.
+uint32_t rohrpost_get_u32(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 64 bits.
+uint64_t rohrpost_get_u64(struct rohrpost_decoder *decoder);
+
+// Reads a whole number with a sign, of 8 bits.
+int8_t rohrpost_get_i8(struct rohrpost_decoder *decoder);
+
+// Reads a whole number with a sign, of 16 bits.
+int16_t rohrpost_get_i16(struct rohrpost_decoder *decoder);
+
+// Reads a whole number with a sign, of 32 bits.
+int32_t rohrpost_get_i32(struct rohrpost_decoder *decoder);
+
+// Reads a whole number with a sign, of 64 bits.
+int64_t rohrpost_get_i64(struct rohrpost_decoder *decoder);
+
+// Reads a number with a fraction, of 32 bits.
+float rohrpost_get_f32(struct rohrpost_decoder *decoder);
+
+// Reads a number with a fraction, of 64 bits.
+double rohrpost_get_f64(struct rohrpost_decoder *decoder);
+
+// Reads a whole number from 0, of 128 bits: its lower half, and through `high` the upper one.
+uint64_t rohrpost_get_u128(struct rohrpost_decoder *decoder, uint64_t *high);
+
+// Reads a whole number with a sign, of 128 bits: its lower half, and through `high` the upper one.
+uint64_t rohrpost_get_i128(struct rohrpost_decoder *decoder, int64_t *high);
+
+// Reads a character: its number in Unicode.
+uint32_t rohrpost_get_char(struct rohrpost_decoder *decoder);
+
+// Reads the number of a variant; its fields follow.
+uint32_t rohrpost_get_variant(struct rohrpost_decoder *decoder);
+
+// Reads how many elements a list has, if there may be so many: each takes `bytes_min` bytes at least, which is 1 or
+// more.
+size_t rohrpost_get_length(struct rohrpost_decoder *decoder, size_t bytes_min);
+
+// Reads bytes: where they are, and through `len` how many. They are those of the decoder, not a copy.
+const uint8_t *rohrpost_get_bytes(struct rohrpost_decoder *decoder, size_t *len);
+
+// Reads a text, which is UTF-8: where it is, and through `len` how many bytes. No zero ends it.
+const char *rohrpost_get_text(struct rohrpost_decoder *decoder, size_t *len);
+
+// The hash of an interface, by which callers and servers know that they have the same one, in whatever language each
+// is written. Any thread.
 //
 // Pointers:
 // All tables are as their texts say.
@@ -726,238 +790,6 @@ const char *rohrpost_error_text(int32_t code);
 // about. Valid until the next call that fails in this thread. Any thread.
 const char *rohrpost_last_error(void);
 
-// Opens a mailbox for sending: one of this node, or one that a router leads to.
-//
-// The caller owns the sender, and closes it by `rohrpost_sender_close`. Thread: that of the node, as for all calls with
-// the sender.
-rohrpost_code rohrpost_sender_open(struct rohrpost_node node, uint32_t name, struct rohrpost_sender *sender);
-
-// Closes a sender; what it has lent is given up.
-rohrpost_code rohrpost_sender_close(struct rohrpost_sender sender);
-
-// Sends a package with a body of `len` bytes, which are copied. No system call unless the receiver sleeps.
-//
-// Pointers:
-// `body` is null, or points to `len` bytes.
-rohrpost_code rohrpost_send(struct rohrpost_sender sender,
-                            const struct rohrpost_label *label,
-                            const void *body,
-                            size_t len);
-
-// Lends a slot of the mailbox to write a package in place: `body` is its place, of `room` bytes. Until it is sent by
-// `rohrpost_loan_send` or given up by `rohrpost_loan_drop`, the sender is busy.
-rohrpost_code rohrpost_loan(struct rohrpost_sender sender, uint8_t priority, uint8_t **body, size_t *room);
-
-// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent then,
-// also when this fails.
-rohrpost_code rohrpost_loan_send(struct rohrpost_sender sender, const struct rohrpost_label *label, size_t len);
-
-// Gives up what is lent: nothing is sent.
-rohrpost_code rohrpost_loan_drop(struct rohrpost_sender sender);
-
-// Makes this process the receiver of a mailbox; with a null `shape`, of the usual one. What an earlier receiver left
-// there is received first, if the shape is the same.
-//
-// The caller owns the receiver, and closes it by `rohrpost_receiver_close` or `rohrpost_receiver_remove`. Thread: that
-// of the node, as for all calls with the receiver.
-rohrpost_code rohrpost_receiver_open(struct rohrpost_node node,
-                                     uint32_t name,
-                                     const struct rohrpost_mailbox_shape *shape,
-                                     struct rohrpost_receiver *receiver);
-
-// Takes the most important package, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0:
-// for ever; `ROHRPOST_NOTHING` when there is none. The package is in hand until the next package is taken, it is
-// released, or the receiver is closed.
-rohrpost_code rohrpost_receive(struct rohrpost_receiver receiver, int64_t timeout_ns, struct rohrpost_package *package);
-
-// The same; before it sleeps, it looks again and again for `spin_ns`, which takes a whole processor.
-rohrpost_code rohrpost_receive_spinning(struct rohrpost_receiver receiver,
-                                        int64_t timeout_ns,
-                                        uint64_t spin_ns,
-                                        struct rohrpost_package *package);
-
-// Frees the slot of the package in hand, if there is one.
-rohrpost_code rohrpost_receiver_release(struct rohrpost_receiver receiver);
-
-// Closes a receiver. The mailbox stays, and with it what waits there, for the next one.
-rohrpost_code rohrpost_receiver_close(struct rohrpost_receiver receiver);
-
-// Closes a receiver and removes its mailbox; `lost`, which may be null, is how many packages waited there.
-rohrpost_code rohrpost_receiver_remove(struct rohrpost_receiver receiver, size_t *lost);
-
-// Says why a function of a module fails, and returns `ROHRPOST_FAILED` for it to return. Any thread.
-//
-// Pointers:
-// The text is null or ends with a zero.
-rohrpost_code rohrpost_fail(const char *why);
-
-// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls it,
-// with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP.
-//
-// Pointers:
-// All tables are as their texts say, and stay until it returns. `arguments` is null, or points to `count` texts that
-// end with a zero.
-int rohrpost_module_run(const struct rohrpost_module *module, int count, const char *const *arguments);
-
-// Says a line, at a `rohrpost_level`. Any thread; before the module runs, nobody hears it.
-//
-// Pointers:
-// The text is null or ends with a zero.
-rohrpost_code rohrpost_say(uint8_t level, const char *line);
-
-// The module's own name. Only a function of the module may call this, and all `rohrpost_module_...` below.
-rohrpost_code rohrpost_module_name(uint32_t *name);
-
-// System time now.
-rohrpost_code rohrpost_module_now(struct rohrpost_time *now);
-
-// Has `tick` called once in this time, ns, from now on.
-rohrpost_code rohrpost_module_period(uint64_t period_ns);
-
-// The settings that are no parameters, as an object in JSON, with a zero behind it. If the buffer is too small, the
-// last error says how many bytes are needed.
-//
-// Pointers:
-// `buffer` is null, or has room for `size` bytes.
-rohrpost_code rohrpost_module_settings(char *buffer, size_t size);
-
-// The present value of a parameter, to be read at once: it is there until the function ends, or sets one.
-//
-// Pointers:
-// The text is null or ends with a zero.
-rohrpost_code rohrpost_module_parameter(const char *name, struct rohrpost_decoder *value);
-
-// The module sets a parameter of its own.
-//
-// Pointers:
-// The text is null or ends with a zero; `value` is null, or points to `len` bytes.
-rohrpost_code rohrpost_module_set_parameter(const char *name, const void *value, size_t len);
-
-// Publishes a value of the module's data or of a stream, that was true at `stamp_ns`, system time; 0: now. The bytes
-// are copied.
-//
-// Pointers:
-// `value` is null, or points to `len` bytes.
-rohrpost_code rohrpost_module_publish(uint16_t number, uint64_t stamp_ns, const void *value, size_t len);
-
-// Runs a function of another module, `motor.0`, by its number: arguments are values one behind the other, and so is
-// the result, of `reply_len` bytes, which goes into `reply`. Waits for it at most `timeout_ns`, and all else of the
-// module with it. The first call asks the other one what it offers.
-//
-// Pointers:
-// The text is null or ends with a zero. `arguments` is null, or points to `len` bytes. `reply` is null, or has room for
-// `room` bytes.
-rohrpost_code rohrpost_module_call(const char *module,
-                                   uint16_t function,
-                                   const void *arguments,
-                                   size_t len,
-                                   uint64_t timeout_ns,
-                                   void *reply,
-                                   size_t room,
-                                   size_t *reply_len);
-
-// Asks another module for the newest value of its data of this number: its time (ns since 1970, a u64), then the value.
-// For the rest as `rohrpost_module_call`.
-//
-// Pointers:
-// As for `rohrpost_module_call`.
-rohrpost_code rohrpost_module_get(const char *module,
-                                  uint16_t number,
-                                  uint64_t timeout_ns,
-                                  void *reply,
-                                  size_t room,
-                                  size_t *reply_len);
-
-// Has `ready` called when a descriptor is ready for `interest`, bits `ROHRPOST_READ` and `ROHRPOST_WRITE`; `watch` is
-// its number there. The library keeps a duplicate, the caller its own.
-rohrpost_code rohrpost_module_watch(int descriptor, uint8_t interest, uint32_t *watch);
-
-// Watches it no longer.
-rohrpost_code rohrpost_module_unwatch(uint32_t watch);
-
-// Follows data or a stream of another module, by the names of both, as one of `rohrpost_follow` says, once in
-// `period_ns` if that is a period. What comes is given to `received`, with the number that this gives. The other module
-// need not run yet. Only a function of the module may call this.
-//
-// Pointers:
-// Texts are null or end with a zero.
-rohrpost_code rohrpost_module_follow(const char *module,
-                                     const char *item,
-                                     uint8_t how,
-                                     uint64_t period_ns,
-                                     uint32_t *follow);
-
-// Begins a record of a stream whose type ends with bytes: `front` are the values before them and a length of 0, and
-// `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
-// `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
-//
-// Pointers:
-// `front` is null, or points to `front_len` bytes.
-rohrpost_code rohrpost_module_begin(uint16_t number,
-                                    uint64_t stamp_ns,
-                                    const void *front,
-                                    size_t front_len,
-                                    size_t len,
-                                    uint8_t **room);
-
-// Makes the record that is begun the newest of its stream; `sequence`, which may be null, is its number.
-rohrpost_code rohrpost_module_finish(uint64_t *sequence);
-
-// Gives up the record that is begun; nothing is written.
-rohrpost_code rohrpost_module_abandon(void);
-
-// Takes part in the node that launch has started this process on, as its module. The environment says which.
-//
-// The caller owns the node, and closes it by `rohrpost_node_close`. A node belongs to the thread that opens it; each
-// thread opens its own, and takes one of the node's 256 places.
-rohrpost_code rohrpost_node_open(struct rohrpost_node *node);
-
-// Takes part in a node of a configuration, by the file's path. `node_name` may be null if the configuration has the
-// module. `module` is the name that this process takes part as, such as "tool.70"; null: without a name.
-//
-// Owner and thread: as for `rohrpost_node_open`.
-//
-// Pointers:
-// Texts are null or end with a zero.
-rohrpost_code rohrpost_node_open_configured(const char *config,
-                                            const char *node_name,
-                                            const char *module,
-                                            struct rohrpost_node *node);
-
-// Takes part in the node with this directory, as the module of this name (0: without a name). Names are numbers then,
-// such as "1.200.0.0". With `create`, makes the directory if there is none.
-//
-// Owner and thread: as for `rohrpost_node_open`.
-//
-// Pointers:
-// The text is null or ends with a zero.
-rohrpost_code rohrpost_node_open_directory(const char *directory,
-                                           bool create,
-                                           uint32_t module,
-                                           struct rohrpost_node *node);
-
-// Closes a node. What was opened by it stays open. Thread: that of the node.
-rohrpost_code rohrpost_node_close(struct rohrpost_node node);
-
-// The name that a text means: "motor.0", "motor.0.2", "1.200.0.2". Thread: that of the node.
-//
-// Pointers:
-// The text is null or ends with a zero.
-rohrpost_code rohrpost_name_parse(struct rohrpost_node node, const char *name_text, uint32_t *name);
-
-// Writes a name as text into a buffer, with a zero behind it. If the buffer is too small, the last error says how many
-// bytes are needed. Thread: that of the node.
-//
-// Pointers:
-// `buffer` is null, or has room for `size` bytes.
-rohrpost_code rohrpost_name_text(struct rohrpost_node node, uint32_t name, char *buffer, size_t size);
-
-// System time now. No system call. Thread: that of the node.
-rohrpost_code rohrpost_time_now(struct rohrpost_node node, struct rohrpost_time *now);
-
-// Version of the layout of shared memory that this library reads: both sides of a mailbox have the same. Any thread.
-unsigned int rohrpost_layout_version(void);
-
 // Begins to write values into `room` bytes. Any thread, as for all functions of encoders and decoders: they belong to
 // the caller, and need no end.
 //
@@ -968,15 +800,6 @@ struct rohrpost_encoder rohrpost_encode(void *bytes, size_t room);
 // How many bytes were written, or `ROHRPOST_SMALL_BUFFER` when they did not fit, `ROHRPOST_VALUE` when a value cannot
 // be.
 rohrpost_code rohrpost_encoded(const struct rohrpost_encoder *encoder, size_t *len);
-
-// Begins to read values from `len` bytes.
-//
-// Pointers:
-// `bytes` is null, or points to `len` bytes, which stay as they are until all is read.
-struct rohrpost_decoder rohrpost_decode(const void *bytes, size_t len);
-
-// Whether all was read, and nothing is left; else `ROHRPOST_MALFORMED`.
-rohrpost_code rohrpost_decoded(const struct rohrpost_decoder *decoder);
 
 // Writes true or false; also whether an option has a value, which follows then.
 void rohrpost_put_bool(struct rohrpost_encoder *encoder, bool value);
@@ -1038,60 +861,235 @@ void rohrpost_put_bytes(struct rohrpost_encoder *encoder, const void *value, siz
 // `value` is null, or points to `len` bytes.
 void rohrpost_put_text(struct rohrpost_encoder *encoder, const char *value, size_t len);
 
-// Reads true or false; also whether an option has a value, which follows then.
-bool rohrpost_get_bool(struct rohrpost_decoder *decoder);
+// Opens a mailbox for sending: one of this node, or one that a router leads to.
+//
+// The caller owns the sender, and closes it by `rohrpost_sender_close`. Thread: that of the node, as for all calls
+// with the sender.
+rohrpost_code rohrpost_sender_open(struct rohrpost_node node, uint32_t name, struct rohrpost_sender *sender);
 
-// Reads a whole number from 0, of 8 bits.
-uint8_t rohrpost_get_u8(struct rohrpost_decoder *decoder);
+// Closes a sender; what it has lent is given up.
+rohrpost_code rohrpost_sender_close(struct rohrpost_sender sender);
 
-// Reads a whole number from 0, of 16 bits.
-uint16_t rohrpost_get_u16(struct rohrpost_decoder *decoder);
+// Sends a package with a body of `len` bytes, which are copied. No system call unless the receiver sleeps.
+//
+// Pointers:
+// `body` is null, or points to `len` bytes.
+rohrpost_code rohrpost_send(struct rohrpost_sender sender,
+                            const struct rohrpost_label *label,
+                            const void *body,
+                            size_t len);
 
-// Reads a whole number from 0, of 32 bits.
-uint32_t rohrpost_get_u32(struct rohrpost_decoder *decoder);
+// Lends a slot of the mailbox to write a package in place: `body` is its place, of `room` bytes. Until it is sent by
+// `rohrpost_loan_send` or given up by `rohrpost_loan_drop`, the sender is busy.
+rohrpost_code rohrpost_loan(struct rohrpost_sender sender, uint8_t priority, uint8_t **body, size_t *room);
 
-// Reads a whole number from 0, of 64 bits.
-uint64_t rohrpost_get_u64(struct rohrpost_decoder *decoder);
+// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent
+// then, also when this fails.
+rohrpost_code rohrpost_loan_send(struct rohrpost_sender sender, const struct rohrpost_label *label, size_t len);
 
-// Reads a whole number with a sign, of 8 bits.
-int8_t rohrpost_get_i8(struct rohrpost_decoder *decoder);
+// Gives up what is lent: nothing is sent.
+rohrpost_code rohrpost_loan_drop(struct rohrpost_sender sender);
 
-// Reads a whole number with a sign, of 16 bits.
-int16_t rohrpost_get_i16(struct rohrpost_decoder *decoder);
+// Makes this process the receiver of a mailbox; with a null `shape`, of the usual one. What an earlier receiver left
+// there is received first, if the shape is the same.
+//
+// The caller owns the receiver, and closes it by `rohrpost_receiver_close` or `rohrpost_receiver_remove`. Thread: that
+// of the node, as for all calls with the receiver.
+rohrpost_code rohrpost_receiver_open(struct rohrpost_node node,
+                                     uint32_t name,
+                                     const struct rohrpost_mailbox_shape *shape,
+                                     struct rohrpost_receiver *receiver);
 
-// Reads a whole number with a sign, of 32 bits.
-int32_t rohrpost_get_i32(struct rohrpost_decoder *decoder);
+// Takes the most important package, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0:
+// for ever; `ROHRPOST_NOTHING` when there is none. The package is in hand until the next package is taken, it is
+// released, or the receiver is closed.
+rohrpost_code rohrpost_receive(struct rohrpost_receiver receiver, int64_t timeout_ns, struct rohrpost_package *package);
 
-// Reads a whole number with a sign, of 64 bits.
-int64_t rohrpost_get_i64(struct rohrpost_decoder *decoder);
+// The same; before it sleeps, it looks again and again for `spin_ns`, which takes a whole processor.
+rohrpost_code rohrpost_receive_spinning(struct rohrpost_receiver receiver,
+                                        int64_t timeout_ns,
+                                        uint64_t spin_ns,
+                                        struct rohrpost_package *package);
 
-// Reads a number with a fraction, of 32 bits.
-float rohrpost_get_f32(struct rohrpost_decoder *decoder);
+// Frees the slot of the package in hand, if there is one.
+rohrpost_code rohrpost_receiver_release(struct rohrpost_receiver receiver);
 
-// Reads a number with a fraction, of 64 bits.
-double rohrpost_get_f64(struct rohrpost_decoder *decoder);
+// Closes a receiver. The mailbox stays, and with it what waits there, for the next one.
+rohrpost_code rohrpost_receiver_close(struct rohrpost_receiver receiver);
 
-// Reads a whole number from 0, of 128 bits: its lower half, and through `high` the upper one.
-uint64_t rohrpost_get_u128(struct rohrpost_decoder *decoder, uint64_t *high);
+// Closes a receiver and removes its mailbox; `lost`, which may be null, is how many packages waited there.
+rohrpost_code rohrpost_receiver_remove(struct rohrpost_receiver receiver, size_t *lost);
 
-// Reads a whole number with a sign, of 128 bits: its lower half, and through `high` the upper one.
-uint64_t rohrpost_get_i128(struct rohrpost_decoder *decoder, int64_t *high);
+// Says why a function of a module fails, and returns `ROHRPOST_FAILED` for it to return. Any thread.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_fail(const char *why);
 
-// Reads a character: its number in Unicode.
-uint32_t rohrpost_get_char(struct rohrpost_decoder *decoder);
+// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls
+// it, with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP. SIGPIPE is
+// ignored from then on.
+//
+// Pointers:
+// All tables are as their texts say, and stay until it returns. `arguments` is null, or points to `count` texts that
+// end with a zero.
+int rohrpost_module_run(const struct rohrpost_module *module, int count, const char *const *arguments);
 
-// Reads the number of a variant; its fields follow.
-uint32_t rohrpost_get_variant(struct rohrpost_decoder *decoder);
+// Says a line, at a `rohrpost_level`. Any thread; before the module runs, nobody hears it.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_say(uint8_t level, const char *line);
 
-// Reads how many elements a list has, if there may be so many: each takes `bytes_min` bytes at least, which is 1 or
-// more.
-size_t rohrpost_get_length(struct rohrpost_decoder *decoder, size_t bytes_min);
+// The module's own name. Only a function of the module may call this, and all `rohrpost_module_...` below.
+rohrpost_code rohrpost_module_name(uint32_t *name);
 
-// Reads bytes: where they are, and through `len` how many. They are those of the decoder, not a copy.
-const uint8_t *rohrpost_get_bytes(struct rohrpost_decoder *decoder, size_t *len);
+// System time now.
+rohrpost_code rohrpost_module_now(struct rohrpost_time *now);
 
-// Reads a text, which is UTF-8: where it is, and through `len` how many bytes. No zero ends it.
-const char *rohrpost_get_text(struct rohrpost_decoder *decoder, size_t *len);
+// Has `tick` called once in this time, ns, from now on.
+rohrpost_code rohrpost_module_period(uint64_t period_ns);
+
+// The settings that are no parameters, as an object in JSON, with a zero behind it. If the buffer is too small, the
+// last error says how many bytes are needed.
+//
+// Pointers:
+// `buffer` is null, or has room for `size` bytes.
+rohrpost_code rohrpost_module_settings(char *buffer, size_t size);
+
+// The present value of a parameter, to be read at once: it is there until the function ends, or sets one.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_module_parameter(const char *name, struct rohrpost_decoder *value);
+
+// The module sets a parameter of its own.
+//
+// Pointers:
+// The text is null or ends with a zero; `value` is null, or points to `len` bytes.
+rohrpost_code rohrpost_module_set_parameter(const char *name, const void *value, size_t len);
+
+// Publishes a value of the module's data or of a stream, that was true at `stamp_ns`, system time; 0: now. The bytes
+// are copied.
+//
+// Pointers:
+// `value` is null, or points to `len` bytes.
+rohrpost_code rohrpost_module_publish(uint16_t number, uint64_t stamp_ns, const void *value, size_t len);
+
+// Runs a function of another module, `motor.0`, by its number: arguments are values one behind the other, and so is
+// the result, to be read from `reply`; it is there until the next such call. Waits for it at most `timeout_ns`, and
+// all else of the module with it. The first call asks the other one what it offers.
+//
+// Pointers:
+// The text is null or ends with a zero; `arguments` is null, or points to `len` bytes.
+rohrpost_code rohrpost_module_call(const char *module,
+                                   uint16_t function,
+                                   const void *arguments,
+                                   size_t len,
+                                   uint64_t timeout_ns,
+                                   struct rohrpost_decoder *reply);
+
+// Asks another module for the newest value of its data of this number: `reply` is its time (ns since 1970, a u64),
+// then the value. For the rest as `rohrpost_module_call`.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_module_get(const char *module,
+                                  uint16_t number,
+                                  uint64_t timeout_ns,
+                                  struct rohrpost_decoder *reply);
+
+// Has `ready` called when a descriptor is ready for `interest`, bits `ROHRPOST_READ` and `ROHRPOST_WRITE`; `watch` is
+// its number there. The library keeps a duplicate, the caller its own.
+rohrpost_code rohrpost_module_watch(int descriptor, uint8_t interest, uint32_t *watch);
+
+// Watches it no longer.
+rohrpost_code rohrpost_module_unwatch(uint32_t watch);
+
+// Follows data or a stream of another module, by the names of both, as one of `rohrpost_follow` says, once in
+// `period_ns` if that is a period. What comes is given to `received`, with the number that this gives. The other
+// module need not run yet. Only a function of the module may call this.
+//
+// Pointers:
+// Texts are null or end with a zero.
+rohrpost_code rohrpost_module_follow(const char *module,
+                                     const char *item,
+                                     uint8_t how,
+                                     uint64_t period_ns,
+                                     uint32_t *follow);
+
+// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0,
+// and `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
+// `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
+//
+// Pointers:
+// `front` is null, or points to `front_len` bytes.
+rohrpost_code rohrpost_module_begin(uint16_t number,
+                                    uint64_t stamp_ns,
+                                    const void *front,
+                                    size_t front_len,
+                                    size_t len,
+                                    uint8_t **room);
+
+// Makes the record that is begun the newest of its stream; `sequence`, which may be null, is its number.
+rohrpost_code rohrpost_module_finish(uint64_t *sequence);
+
+// Gives up the record that is begun; nothing is written.
+rohrpost_code rohrpost_module_abandon(void);
+
+// Takes part in the node that launch has started this process on; the environment says which. The module itself takes
+// part by `rohrpost_module_run`, so this is for what it does besides: without a name, as launch asks for one process
+// of a name.
+//
+// The caller owns the node, and closes it by `rohrpost_node_close`. A node belongs to the thread that opens it; each
+// thread opens its own, and takes one of the node's 256 places.
+rohrpost_code rohrpost_node_open(struct rohrpost_node *node);
+
+// Takes part in a node of a configuration, by the file's path. `node_name` may be null if the configuration has the
+// module. `module` is the name that this process takes part as, such as "tool.70"; null: without a name.
+//
+// Owner and thread: as for `rohrpost_node_open`.
+//
+// Pointers:
+// Texts are null or end with a zero.
+rohrpost_code rohrpost_node_open_configured(const char *config,
+                                            const char *node_name,
+                                            const char *module,
+                                            struct rohrpost_node *node);
+
+// Takes part in the node with this directory, as the module of this name (0: without a name). Names are numbers then,
+// such as "1.200.0.0". With `create`, makes the directory if there is none.
+//
+// Owner and thread: as for `rohrpost_node_open`.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_node_open_directory(const char *directory,
+                                           bool create,
+                                           uint32_t module,
+                                           struct rohrpost_node *node);
+
+// Closes a node. What was opened by it stays open. Thread: that of the node.
+rohrpost_code rohrpost_node_close(struct rohrpost_node node);
+
+// The name that a text means: "motor.0", "motor.0.2", "1.200.0.2". Thread: that of the node.
+//
+// Pointers:
+// The text is null or ends with a zero.
+rohrpost_code rohrpost_name_parse(struct rohrpost_node node, const char *name_text, uint32_t *name);
+
+// Writes a name as text into a buffer, with a zero behind it. If the buffer is too small, the last error says how many
+// bytes are needed. Thread: that of the node.
+//
+// Pointers:
+// `buffer` is null, or has room for `size` bytes.
+rohrpost_code rohrpost_name_text(struct rohrpost_node node, uint32_t name, char *buffer, size_t size);
+
+// System time now. No system call. Thread: that of the node.
+rohrpost_code rohrpost_time_now(struct rohrpost_node node, struct rohrpost_time *now);
+
+// Version of the layout of shared memory that this library reads: both sides of a mailbox have the same. Any thread.
+unsigned int rohrpost_layout_version(void);
 
 // Opens a stream to read, from what is written next on. There may be no such stream yet. Takes one of its places for
 // readers.
@@ -1136,8 +1134,8 @@ rohrpost_code rohrpost_stream_reader_release(struct rohrpost_stream_reader reade
 // How many records this reader did not get since it was opened, by cause. What is in hand is released.
 rohrpost_code rohrpost_stream_missed(struct rohrpost_stream_reader reader, struct rohrpost_records_missed *missed);
 
-// Makes this process the writer of a stream; with a null `shape`, of the usual one. Records that an earlier writer left
-// there stay, if the shape is the same.
+// Makes this process the writer of a stream; with a null `shape`, of the usual one. Records that an earlier writer
+// left there stay, if the shape is the same.
 //
 // The caller owns the writer, and closes it by `rohrpost_stream_writer_close`. Thread: that of the node, as for all
 // calls with the writer.
@@ -1160,19 +1158,17 @@ rohrpost_code rohrpost_stream_write(struct rohrpost_stream_writer writer,
                                     size_t len,
                                     uint64_t *sequence);
 
-// Begins a record that is written in place: `body` is its place, of `room` bytes, where anything may stand. Readers see
-// it when it is finished by `rohrpost_stream_finish`; until then, or until `rohrpost_stream_abandon`, the writer is
-// busy.
+// Begins a record that is written in place: `body` is its place, of `room` bytes, where anything may stand. Readers
+// see it when it is finished by `rohrpost_stream_finish`; until then, or until `rohrpost_stream_abandon`, the writer
+// is busy.
 rohrpost_code rohrpost_stream_begin(struct rohrpost_stream_writer writer,
                                     struct rohrpost_stamp at,
                                     uint8_t **body,
                                     size_t *room);
 
-// Makes the first `len` bytes of what is begun the next record; `sequence` may be null. It is no longer begun then, also
-// when this fails.
-rohrpost_code rohrpost_stream_finish(struct rohrpost_stream_writer writer,
-                                     size_t len,
-                                     uint64_t *sequence);
+// Makes the first `len` bytes of what is begun the next record; `sequence` may be null. It is no longer begun then,
+// also when this fails.
+rohrpost_code rohrpost_stream_finish(struct rohrpost_stream_writer writer, size_t len, uint64_t *sequence);
 
 // Gives up what is begun: nothing is written.
 rohrpost_code rohrpost_stream_abandon(struct rohrpost_stream_writer writer);
@@ -1186,10 +1182,10 @@ rohrpost_code rohrpost_watch(struct rohrpost_node node, int descriptor, uint8_t 
 // Watches it no longer. Thread: that of the node.
 rohrpost_code rohrpost_unwatch(struct rohrpost_node node, uint32_t watch);
 
-// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has passed
-// (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what came at the
-// last moment is there too: take from each what is there, and wait again. What has a package or record in hand cannot be
-// waited for: release it first.
+// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has
+// passed (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what
+// came at the last moment is there too: take from each what is there, and wait again. What has a package or record in
+// hand cannot be waited for: release it first.
 //
 // Thread: that of the node and of all sources, which were opened by this node.
 //

@@ -21,8 +21,8 @@ const FUNCTION_MIN: u16 = 16;
 /// The first tag of a type with others in it.
 const FIRST_COMPOUND: u8 = TypeKind::Option as u8;
 
-/// The hash of an interface, by which callers and servers know that they have the same one, in whatever language each is
-/// written. Any thread.
+/// The hash of an interface, by which callers and servers know that they have the same one, in whatever language each
+/// is written. Any thread.
 ///
 /// # Safety
 /// All tables are as their texts say.

@@ -6,10 +6,10 @@
 //!         │ a panic becomes a code, its text the last error of the thread
 //! ```
 //!
-//! - **Codes.** Each call returns a `rohrpost_code`: 0 when it is done, above 0 when there is nothing to hand out, below
-//!   0 when it failed. `rohrpost_error_text` has words for a code, `rohrpost_last_error` what exactly was wrong.
-//! - **Handles** are numbers, not pointers: a handle that is closed, of another kind, of another thread or from before a
-//!   fork is a code, whatever else is there by now.
+//! - **Codes.** Each call returns a `rohrpost_code`: 0 when it is done, above 0 when there is nothing to hand out,
+//!   below 0 when it failed. `rohrpost_error_text` has words for a code, `rohrpost_last_error` what exactly was wrong.
+//! - **Handles** are numbers, not pointers: a handle that is closed, of another kind, of another thread or from before
+//!   a fork is a code, whatever else is there by now.
 //! - **Threads.** A handle belongs to the thread that opened it; other threads open their own. Functions without a
 //!   handle may be called by any thread. What a thread has not closed is closed when it ends.
 //! - **Fork.** A child process cannot use what its parent has opened: the parent's locks say that the parent lives. It
@@ -18,13 +18,15 @@
 //!   handle, gives it back, or closes it. No call keeps a pointer that it was given.
 
 pub mod code;
+pub mod decode;
 pub mod description;
 pub mod edge;
+pub mod encode;
 mod lender;
 pub mod mailbox;
 pub mod module;
 pub mod node;
-pub mod postcard;
+mod objects;
 pub mod stream;
 mod table;
 pub mod waiting;

@@ -2,8 +2,8 @@
 
 use crate::code::Code;
 use crate::edge::{bytes, edge, failed, given, place, say, waiting};
-use crate::lender::Lender;
-use crate::node::{NodeHandle, NodeObject};
+use crate::node::NodeHandle;
+use crate::objects::{NodeObject, ReceiverObject, SenderObject};
 use crate::table;
 use rohrpost_mailbox::{Label, Loan, Name, Options, OverflowPolicy, Package, Priority, Receiver, Sender, Shape, Type};
 use std::ffi::c_void;
@@ -105,9 +105,6 @@ pub struct MailboxShape {
     pub max_age_ns: u64,
 }
 
-pub(crate) type SenderObject = Lender<Sender, Loan<'static>>;
-pub(crate) type ReceiverObject = Lender<Receiver, Package<'static>>;
-
 fn label(label: &PackageLabel) -> Label {
     Label {
         from: Name::from_raw(label.from),
@@ -131,8 +128,8 @@ fn shape(shape: &MailboxShape) -> Result<Shape, Code> {
 
 /// Opens a mailbox for sending: one of this node, or one that a router leads to.
 ///
-/// The caller owns the sender, and closes it by `rohrpost_sender_close`. Thread: that of the node, as for all calls with
-/// the sender.
+/// The caller owns the sender, and closes it by `rohrpost_sender_close`. Thread: that of the node, as for all calls
+/// with the sender.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_sender_open(
     node: NodeHandle,
@@ -197,8 +194,8 @@ pub extern "C" fn rohrpost_loan(
     })
 }
 
-/// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent then,
-/// also when this fails.
+/// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent
+/// then, also when this fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_loan_send(sender: SenderHandle, label: Option<&PackageLabel>, len: usize) -> Code {
     edge(|| {

@@ -10,9 +10,10 @@ pub use following::*;
 pub use in_place::*;
 
 use crate::code::Code;
+use crate::decode::{Decoder, decoder};
 use crate::description::{InterfaceTable, ParameterTable, described, list, parameters};
 use crate::edge::{edge, given, last_words, needed_text, say, text};
-use crate::postcard::{Decoder, Encoder, decoder, encoder};
+use crate::encode::{Encoder, encoder};
 use crate::waiting::ReadyDescriptor;
 use current::entered;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Ready};
@@ -76,12 +77,14 @@ pub unsafe extern "C" fn rohrpost_fail(why: *const c_char) -> Code {
     edge(|| {
         // SAFETY: the caller's promise.
         let why = unsafe { text(why, "why") }?;
-        Err(say(Code::Failed, format_args!("{}", why.unwrap_or("the module failed"))))
+        // A copy: it may be the last error, which is written here.
+        let why = why.unwrap_or("the module failed").to_owned();
+        Err(say(Code::Failed, format_args!("{why}")))
     })
 }
 
-/// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls it,
-/// with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP. SIGPIPE is
+/// Runs a module, as launch asks for it, until it is told to end; returns the exit code of the process. `main` calls
+/// it, with its own arguments, and nothing else of the process may then handle SIGTERM, SIGINT and SIGHUP. SIGPIPE is
 /// ignored from then on.
 ///
 /// # Safety
@@ -236,9 +239,10 @@ impl NativeModule for CModule<'_> {
     fn parameters_changed(&mut self, context: &mut NativeContext<'_>, changed: &[&str]) -> Result<(), ModuleError> {
         let names: Vec<CString> = changed.iter().filter_map(|name| CString::new(*name).ok()).collect();
         let pointers: Vec<*const c_char> = names.iter().map(|name| name.as_ptr()).collect();
-        // SAFETY: as above.
         let call = |table: &ModuleTable| {
-            table.parameters_changed.map(|tell| unsafe { tell(table.user, pointers.as_ptr(), pointers.len()) })
+            let tell = table.parameters_changed?;
+            // SAFETY: as above; the names outlive the call.
+            Some(unsafe { tell(table.user, pointers.as_ptr(), pointers.len()) })
         };
         self.call(context, call)
     }

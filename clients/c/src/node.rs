@@ -2,9 +2,10 @@
 
 use crate::code::Code;
 use crate::edge::{bytes_to, edge, failed, needed_text, place, say, text};
+use crate::objects::NodeObject;
 use crate::table;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, Participant, SystemClock, SystemTime, Watches, node_directory};
+use rohrpost_mailbox::{Name, Node, Participant, SystemClock, SystemTime, node_directory};
 use std::ffi::{c_char, c_uint};
 use std::mem::MaybeUninit;
 use std::path::Path;
@@ -42,22 +43,14 @@ impl TimeNow {
     }
 }
 
-pub(crate) struct NodeObject {
-    pub(crate) participant: Arc<Participant>,
-    /// Descriptors that it waits for besides mailboxes; made with the first of them.
-    pub(crate) watches: Option<Watches>,
-    clock: SystemClock,
-    installation: Option<Arc<Installation>>,
-}
-
 impl NodeObject {
     fn join(node: &Arc<Node>, module: Name, installation: Option<Arc<Installation>>) -> Result<Self, Code> {
         let participant = Participant::join(node, module).map_err(failed)?;
         Ok(Self { clock: SystemClock::open(node), participant, watches: None, installation })
     }
 
-    /// By a configuration: its node of this name, as this module.
-    fn configured(file: &str, node: Option<&str>, module: Option<&str>) -> Result<Self, Code> {
+    /// By a configuration: its node of this name, or that of this module, under the module's name or none.
+    fn configured(file: &str, node: Option<&str>, module: Option<&str>, is_module: bool) -> Result<Self, Code> {
         let installation = Arc::new(Installation::load(Path::new(file)).map_err(failed)?);
         let module = module.map(|text| installation.classes.parse_module(text)).transpose().map_err(failed)?;
         let lacks = |what: &str| say(Code::Configuration, format_args!("{file}: {what}"));
@@ -65,7 +58,8 @@ impl NodeObject {
         let name = node.or_else(of_module).ok_or_else(|| lacks("name a node, or a module that it has"))?;
         let found = installation.node(name).ok_or_else(|| lacks(&format!("there is no node `{name}`")))?;
         let opened = Node::open(&node_directory(&installation.name, &found.name)).map_err(failed)?;
-        Self::join(&opened, module.unwrap_or(Name::NONE), Some(installation.clone()))
+        let own = module.filter(|_| is_module).unwrap_or(Name::NONE);
+        Self::join(&opened, own, Some(installation.clone()))
     }
 
     /// A name by its text.
@@ -93,7 +87,9 @@ fn open(
     Ok(())
 }
 
-/// Takes part in the node that launch has started this process on, as its module. The environment says which.
+/// Takes part in the node that launch has started this process on; the environment says which. The module itself takes
+/// part by `rohrpost_module_run`, so this is for what it does besides: without a name, as launch asks for one process
+/// of a name.
 ///
 /// The caller owns the node, and closes it by `rohrpost_node_close`. A node belongs to the thread that opens it; each
 /// thread opens its own, and takes one of the node's 256 places.
@@ -107,7 +103,7 @@ pub extern "C" fn rohrpost_node_open(node: Option<&mut MaybeUninit<NodeHandle>>)
                 let words = format_args!("{config} and {module} are not set: launch did not start this process");
                 return Err(say(Code::Configuration, words));
             };
-            NodeObject::configured(&config, None, Some(&module))
+            NodeObject::configured(&config, None, Some(&module), false)
         })
     })
 }
@@ -130,7 +126,7 @@ pub unsafe extern "C" fn rohrpost_node_open_configured(
         // SAFETY: the caller's promise of all three.
         let (config, name, module) =
             unsafe { (needed_text(config, "config")?, text(node_name, "node_name")?, text(module, "module")?) };
-        open(node, || NodeObject::configured(config, name, module))
+        open(node, || NodeObject::configured(config, name, module, true))
     })
 }
 

@@ -3,13 +3,11 @@
 mod read;
 mod write;
 
-pub(crate) use read::ReaderObject;
 pub use read::{
     ReaderHandle, Record, RecordAbout, RecordsAround, RecordsMissed, rohrpost_stream_around, rohrpost_stream_missed,
     rohrpost_stream_newest, rohrpost_stream_next, rohrpost_stream_reader_close, rohrpost_stream_reader_open,
     rohrpost_stream_reader_release, rohrpost_stream_record,
 };
-pub(crate) use write::WriterObject;
 pub use write::{
     WriterHandle, rohrpost_stream_abandon, rohrpost_stream_begin, rohrpost_stream_finish, rohrpost_stream_write,
     rohrpost_stream_writer_close, rohrpost_stream_writer_open,

@@ -12,9 +12,7 @@
 
 use crate::code::Code;
 use crate::edge::say;
-use crate::mailbox::{ReceiverObject, SenderObject};
-use crate::node::NodeObject;
-use crate::stream::{ReaderObject, WriterObject};
+use crate::objects::{Kind, Object};
 use std::cell::RefCell;
 use std::sync::Once;
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
@@ -23,54 +21,6 @@ use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 const PLACES_MAX: usize = 1 << 16;
 /// Threads are told apart by so many bits.
 const THREAD_MASK: u32 = (1 << 24) - 1;
-
-/// What a handle stands for.
-pub(crate) enum Object {
-    Node(NodeObject),
-    Sender(SenderObject),
-    Receiver(ReceiverObject),
-    Writer(WriterObject),
-    Reader(ReaderObject),
-}
-
-/// A kind of object.
-pub(crate) trait Kind: Sized {
-    /// Its number in handles; not 0.
-    const NUMBER: u8;
-    /// What messages call it.
-    const WHAT: &'static str;
-    fn store(self) -> Object;
-    fn find(object: &mut Object) -> Option<&mut Self>;
-    fn take(object: Object) -> Option<Self>;
-}
-
-macro_rules! kinds {
-    ($($variant:ident($object:ident) $number:literal $what:literal),*) => {$(
-        impl Kind for $object {
-            const NUMBER: u8 = $number;
-            const WHAT: &'static str = $what;
-
-            fn store(self) -> Object {
-                Object::$variant(self)
-            }
-
-            fn find(object: &mut Object) -> Option<&mut Self> {
-                if let Object::$variant(object) = object { Some(object) } else { None }
-            }
-
-            fn take(object: Object) -> Option<Self> {
-                if let Object::$variant(object) = object { Some(object) } else { None }
-            }
-        }
-    )*};
-}
-kinds! {
-    Node(NodeObject) 1 "node",
-    Sender(SenderObject) 2 "sender",
-    Receiver(ReceiverObject) 3 "receiver",
-    Writer(WriterObject) 4 "writer of a stream",
-    Reader(ReaderObject) 5 "reader of a stream"
-}
 
 /// How often this process became a child by `fork`: what was opened before that is its parent's.
 static FORKS: AtomicU32 = AtomicU32::new(0);

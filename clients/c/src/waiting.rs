@@ -2,9 +2,8 @@
 
 use crate::code::Code;
 use crate::edge::{edge, failed, place, say, waiting};
-use crate::mailbox::ReceiverObject;
-use crate::node::{NodeHandle, NodeObject};
-use crate::stream::ReaderObject;
+use crate::node::NodeHandle;
+use crate::objects::{NodeObject, ReaderObject, ReceiverObject};
 use crate::table;
 use arrayvec::ArrayVec;
 use rohrpost_mailbox::{Interest, Participant, Source, Watch, Watches, wait_any};
@@ -108,10 +107,10 @@ pub extern "C" fn rohrpost_unwatch(node: NodeHandle, watch: u32) -> Code {
     })
 }
 
-/// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has passed
-/// (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what came at the
-/// last moment is there too: take from each what is there, and wait again. What has a package or record in hand cannot be
-/// waited for: release it first.
+/// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has
+/// passed (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what
+/// came at the last moment is there too: take from each what is there, and wait again. What has a package or record in
+/// hand cannot be waited for: release it first.
 ///
 /// Thread: that of the node and of all sources, which were opened by this node.
 ///

@@ -20,8 +20,8 @@
     do {                                                                                               \
         rohrpost_code given_ = (call);                                                                 \
         if (given_ != (code)) {                                                                        \
-            fprintf(stderr, "%s:%d: %s gives %d (%s), not %s; last error: %s\n", __FILE__, __LINE__, #call, (int)given_, \
-                rohrpost_error_text(given_), #code, rohrpost_last_error());                            \
+            fprintf(stderr, "%s:%d: %s gives %d (%s), not %s; last error: %s\n", __FILE__, __LINE__,   \
+                #call, (int)given_, rohrpost_error_text(given_), #code, rohrpost_last_error());        \
             exit(1);                                                                                   \
         }                                                                                              \
     } while (0)

@@ -25,11 +25,19 @@ fn is_there(program: &str) -> bool {
 }
 
 /// Compiles a program of this folder with warnings as errors, linked with the shared library of this build.
-fn compiled(folder: &Path, (compiler, options): (&str, &[&str]), source: &str) -> PathBuf {
+fn compiled(folder: &Path, way: (&str, &[&str]), source: &str) -> PathBuf {
+    let rpath = format!("-Wl,-rpath,{}", libraries().display());
+    linked(folder, way, source, &[&rpath, "-lrohrpost_c", "-lm"])
+}
+
+/// target/debug/deps, where Cargo has put them.
+fn libraries() -> PathBuf {
+    std::env::current_exe().unwrap().parent().unwrap().to_owned()
+}
+
+fn linked(folder: &Path, (compiler, options): (&str, &[&str]), source: &str, libraries: &[&str]) -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let program = folder.join("program");
-    // target/debug/deps, where Cargo has put it.
-    let library = std::env::current_exe().unwrap().parent().unwrap().to_owned();
     let output = Command::new(compiler)
         .args(["-Wall", "-Wextra", "-Werror", "-pthread", "-D_GNU_SOURCE"])
         .args(options)
@@ -39,9 +47,9 @@ fn compiled(folder: &Path, (compiler, options): (&str, &[&str]), source: &str) -
         .arg("-o")
         .arg(&program)
         .arg("-L")
-        .arg(&library)
-        .arg(format!("-Wl,-rpath,{}", library.display()))
-        .args(["-x", "none", "-lrohrpost_c", "-lm"])
+        .arg(self::libraries())
+        .args(["-x", "none"])
+        .args(libraries)
         .output()
         .unwrap();
     assert!(output.status.success(), "{compiler} {options:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -95,6 +103,23 @@ fn values_in_c_and_in_c_plus_plus() {
 }
 
 #[test]
+fn the_static_library_needs_what_its_pkg_config_file_says() {
+    let description = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("rohrpost.pc.in")).unwrap();
+    let private = description.lines().find_map(|line| line.strip_prefix("Libs.private: ")).unwrap();
+    let libraries: Vec<&str> = ["-l:librohrpost_c.a"].into_iter().chain(private.split(' ')).collect();
+    let folder = tempfile::tempdir_in("/dev/shm").unwrap();
+    let program = linked(folder.path(), ("gcc", &["-std=c11"]), "values.c", &libraries);
+    assert_eq!(runs(Command::new(program), folder.path()), "");
+}
+
+#[test]
+fn packages_and_records_take_nothing_from_the_heap() {
+    let folder = tempfile::tempdir_in("/dev/shm").unwrap();
+    let program = compiled(folder.path(), ("gcc", &["-std=c11"]), "hot_path.c");
+    assert_eq!(runs(Command::new(program), folder.path()), "");
+}
+
+#[test]
 fn wrappers_in_c_plus_plus() {
     every_way("wrappers.cpp", "");
 }
@@ -104,7 +129,14 @@ fn wrappers_in_c_plus_plus() {
 enum Either {
     Nothing,
     Number(i16),
-    Pose { x_m: f64, y_m: f64, heading_rad: f64 },
+    Pose {
+        #[schema(unit = "m")]
+        x_m: f64,
+        #[schema(unit = "m")]
+        y_m: f64,
+        #[schema(unit = "rad")]
+        heading_rad: f64,
+    },
 }
 
 /// The same.

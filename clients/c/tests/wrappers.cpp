@@ -41,6 +41,8 @@ int main(int, char **arguments) {
         CHECK(package && (*package)->len == 6 && memcmp((*package)->body, "copied", 6) == 0);
         throws(ROHRPOST_BUSY, [&] { node.wait({receiver.source()}); });
     }
+    // The package was released with its wrapper.
+    CHECK(node.wait({receiver.source()}));
     CHECK(memcmp((*receiver.receive())->body, "placed", 6) == 0);
     try {
         sender.send_in_place(LABEL, [](uint8_t *, size_t) -> size_t { throw std::runtime_error("never sent"); });

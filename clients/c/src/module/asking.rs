@@ -2,12 +2,13 @@
 
 use super::current::with_context;
 use crate::code::Code;
+use crate::decode::{Decoder, decoder};
 use crate::edge::{bytes, bytes_to, edge, failed, needed_text, place, say};
 use crate::node::TimeNow;
-use crate::postcard::{Decoder, decoder};
 use crate::waiting::{interest_of, open_descriptor};
 use rohrpost_mailbox::Watch;
 use rohrpost_native::{CallError, Fault, Moment, NativeContext, Peer, SayLevel, say as say_line};
+use std::cell::RefCell;
 use std::ffi::{c_char, c_int, c_void};
 use std::mem::MaybeUninit;
 use std::rc::Rc;
@@ -69,7 +70,12 @@ pub extern "C" fn rohrpost_module_now(now: Option<&mut MaybeUninit<TimeNow>>) ->
 /// Has `tick` called once in this time, ns, from now on.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_module_period(period_ns: u64) -> Code {
-    edge(|| with_context(|context| Ok(context.set_period(Duration::from_nanos(period_ns)))))
+    edge(|| {
+        with_context(|context| {
+            context.set_period(Duration::from_nanos(period_ns));
+            Ok(())
+        })
+    })
 }
 
 /// The settings that are no parameters, as an object in JSON, with a zero behind it. If the buffer is too small, the
@@ -135,13 +141,17 @@ pub(super) fn moment(stamp_ns: u64) -> Option<Moment> {
     Some(stamp_ns).filter(|ns| *ns > 0).map(Moment::Ns)
 }
 
+thread_local! {
+    /// The last answer of another module.
+    static REPLY: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+}
+
 /// Runs a function of another module, `motor.0`, by its number: arguments are values one behind the other, and so is
-/// the result, of `reply_len` bytes, which goes into `reply`. Waits for it at most `timeout_ns`, and all else of the
-/// module with it. The first call asks the other one what it offers.
+/// the result, to be read from `reply`; it is there until the next such call. Waits for it at most `timeout_ns`, and
+/// all else of the module with it. The first call asks the other one what it offers.
 ///
 /// # Safety
-/// The text is null or ends with a zero. `arguments` is null, or points to `len` bytes. `reply` is null, or has room for
-/// `room` bytes.
+/// The text is null or ends with a zero; `arguments` is null, or points to `len` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rohrpost_module_call(
     module: *const c_char,
@@ -149,41 +159,33 @@ pub unsafe extern "C" fn rohrpost_module_call(
     arguments: *const c_void,
     len: usize,
     timeout_ns: u64,
-    reply: *mut c_void,
-    room: usize,
-    reply_len: Option<&mut MaybeUninit<usize>>,
+    reply: Option<&mut MaybeUninit<Decoder>>,
 ) -> Code {
     edge(|| {
         // SAFETY: the caller's promise.
         let (module, arguments) = unsafe { (needed_text(module, "module")?, bytes(arguments, len, "arguments")?) };
         let timeout = Duration::from_nanos(timeout_ns);
-        let result = asked(module, timeout, |context, peer| context.call(peer, function, arguments, timeout))?;
-        // SAFETY: the caller's promise.
-        unsafe { answer(&result, reply, room, reply_len) }
+        asked(module, timeout, reply, |context, peer| context.call(peer, function, arguments, timeout))
     })
 }
 
-/// Asks another module for the newest value of its data of this number: its time (ns since 1970, a u64), then the value.
-/// For the rest as `rohrpost_module_call`.
+/// Asks another module for the newest value of its data of this number: `reply` is its time (ns since 1970, a u64),
+/// then the value. For the rest as `rohrpost_module_call`.
 ///
 /// # Safety
-/// As for `rohrpost_module_call`.
+/// The text is null or ends with a zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rohrpost_module_get(
     module: *const c_char,
     number: u16,
     timeout_ns: u64,
-    reply: *mut c_void,
-    room: usize,
-    reply_len: Option<&mut MaybeUninit<usize>>,
+    reply: Option<&mut MaybeUninit<Decoder>>,
 ) -> Code {
     edge(|| {
         // SAFETY: the caller's promise.
         let module = unsafe { needed_text(module, "module") }?;
         let timeout = Duration::from_nanos(timeout_ns);
-        let result = asked(module, timeout, |context, peer| context.get(peer, number, timeout))?;
-        // SAFETY: the caller's promise.
-        unsafe { answer(&result, reply, room, reply_len) }
+        asked(module, timeout, reply, |context, peer| context.get(peer, number, timeout))
     })
 }
 
@@ -191,37 +193,22 @@ pub unsafe extern "C" fn rohrpost_module_get(
 fn asked(
     module: &str,
     timeout: Duration,
+    reply: Option<&mut MaybeUninit<Decoder>>,
     ask: impl FnOnce(&mut NativeContext<'_>, &Rc<Peer>) -> Result<Vec<u8>, CallError>,
-) -> Result<Vec<u8>, Code> {
-    with_context(|context| {
+) -> Result<(), Code> {
+    let out = place(reply, "reply")?;
+    let result = with_context(|context| {
         let peer = context.peer(module, timeout).map_err(failed)?;
         let result = ask(context, &peer);
         if let Err(CallError::Fault(_, Fault::InterfaceDiffers { .. })) = &result {
             context.forget(&peer);
         }
         result.map_err(failed)
-    })
-}
-
-/// # Safety
-/// `reply` is null, or has room for `room` bytes.
-unsafe fn answer(
-    result: &[u8],
-    reply: *mut c_void,
-    room: usize,
-    reply_len: Option<&mut MaybeUninit<usize>>,
-) -> Result<(), Code> {
-    if let Some(len) = reply_len {
-        len.write(result.len());
-    }
-    if result.len() > room || reply.is_null() && !result.is_empty() {
-        let need = result.len();
-        return Err(say(Code::SmallBuffer, format_args!("it was run; its result of {need} bytes needs more room")));
-    }
-    if !result.is_empty() {
-        // SAFETY: the caller's promise, and the result is memory of Rust's.
-        unsafe { std::ptr::copy_nonoverlapping(result.as_ptr(), reply.cast(), result.len()) };
-    }
+    })?;
+    REPLY.with_borrow_mut(|kept| {
+        *kept = result;
+        out.write(decoder(kept));
+    });
     Ok(())
 }
 

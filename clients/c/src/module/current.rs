@@ -1,5 +1,5 @@
-//! The context of the module whose function runs now, in its thread. So no function of C carries it about, keeps it for
-//! longer than it is there, or hands it to another thread.
+//! The context of the module of which a function runs now, in its thread. So no function of C carries it about, keeps
+//! it for longer than it is there, or hands it to another thread.
 
 use crate::code::Code;
 use crate::edge::say;
@@ -7,14 +7,14 @@ use rohrpost_native::NativeContext;
 use std::cell::Cell;
 use std::ptr::NonNull;
 
-type Place = Option<NonNull<NativeContext<'static>>>;
+type Current = Option<NonNull<NativeContext<'static>>>;
 
 thread_local! {
-    static CURRENT: Cell<Place> = const { Cell::new(None) };
+    static CURRENT: Cell<Current> = const { Cell::new(None) };
 }
 
 /// Puts back what was there before, whatever happens.
-struct Restore(Place);
+struct Restore(Current);
 
 impl Drop for Restore {
     fn drop(&mut self) {

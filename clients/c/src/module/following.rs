@@ -54,8 +54,8 @@ pub(super) fn followed(data: &FollowedData<'_>) -> DataFollowed {
 }
 
 /// Follows data or a stream of another module, by the names of both, as one of `rohrpost_follow` says, once in
-/// `period_ns` if that is a period. What comes is given to `received`, with the number that this gives. The other module
-/// need not run yet. Only a function of the module may call this.
+/// `period_ns` if that is a period. What comes is given to `received`, with the number that this gives. The other
+/// module need not run yet. Only a function of the module may call this.
 ///
 /// # Safety
 /// Texts are null or end with a zero.

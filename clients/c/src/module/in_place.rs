@@ -14,8 +14,8 @@ thread_local! {
     static OWN: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Begins a record of a stream whose type ends with bytes: `front` are the values before them and a length of 0, and
-/// `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
+/// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0,
+/// and `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
 /// `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
 ///
 /// # Safety
@@ -62,5 +62,10 @@ pub extern "C" fn rohrpost_module_finish(sequence: Option<&mut MaybeUninit<u64>>
 /// Gives up the record that is begun; nothing is written.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_module_abandon() -> Code {
-    edge(|| with_context(|context| Ok(context.abandon())))
+    edge(|| {
+        with_context(|context| {
+            context.abandon();
+            Ok(())
+        })
+    })
 }

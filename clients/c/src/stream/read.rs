@@ -3,8 +3,8 @@
 use super::{RecordStamp, StreamNumber, id, stamp};
 use crate::code::Code;
 use crate::edge::{edge, failed, place, say, waiting};
-use crate::lender::Lender;
-use crate::node::{NodeHandle, NodeObject};
+use crate::node::NodeHandle;
+use crate::objects::{NodeObject, ReaderObject};
 use crate::table;
 use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo, StreamReader};
 use std::mem::MaybeUninit;
@@ -61,8 +61,6 @@ pub struct RecordsMissed {
     /// Overwritten before they were read.
     pub passed_over: u64,
 }
-
-pub(crate) type ReaderObject = Lender<StreamReader, HeldRecord<'static>>;
 
 fn about(info: RecordInfo) -> RecordAbout {
     let stamp = RecordStamp { epoch: info.stamp.epoch, ns: info.stamp.ns };

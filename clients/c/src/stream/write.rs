@@ -3,8 +3,8 @@
 use super::{RecordStamp, RingShape, StreamNumber, id, shape, stamp};
 use crate::code::Code;
 use crate::edge::{bytes, edge, failed, place, say};
-use crate::lender::Lender;
-use crate::node::{NodeHandle, NodeObject};
+use crate::node::NodeHandle;
+use crate::objects::{NodeObject, WriterObject};
 use crate::table;
 use rohrpost_mailbox::{OpenRecord, StreamWriter};
 use std::ffi::c_void;
@@ -18,10 +18,8 @@ pub struct WriterHandle {
     pub id: u64,
 }
 
-pub(crate) type WriterObject = Lender<StreamWriter, OpenRecord<'static>>;
-
-/// Makes this process the writer of a stream; with a null `shape`, of the usual one. Records that an earlier writer left
-/// there stay, if the shape is the same.
+/// Makes this process the writer of a stream; with a null `shape`, of the usual one. Records that an earlier writer
+/// left there stay, if the shape is the same.
 ///
 /// The caller owns the writer, and closes it by `rohrpost_stream_writer_close`. Thread: that of the node, as for all
 /// calls with the writer.
@@ -71,9 +69,9 @@ pub unsafe extern "C" fn rohrpost_stream_write(
     })
 }
 
-/// Begins a record that is written in place: `body` is its place, of `room` bytes, where anything may stand. Readers see
-/// it when it is finished by `rohrpost_stream_finish`; until then, or until `rohrpost_stream_abandon`, the writer is
-/// busy.
+/// Begins a record that is written in place: `body` is its place, of `room` bytes, where anything may stand. Readers
+/// see it when it is finished by `rohrpost_stream_finish`; until then, or until `rohrpost_stream_abandon`, the writer
+/// is busy.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_begin(
     writer: WriterHandle,
@@ -95,8 +93,8 @@ pub extern "C" fn rohrpost_stream_begin(
     })
 }
 
-/// Makes the first `len` bytes of what is begun the next record; `sequence` may be null. It is no longer begun then, also
-/// when this fails.
+/// Makes the first `len` bytes of what is begun the next record; `sequence` may be null. It is no longer begun then,
+/// also when this fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_finish(
     writer: WriterHandle,
