@@ -58,30 +58,30 @@ impl Interpreter {
     /// Whether it has what a script needs.
     ///
     /// # Errors
-    /// [`Failure::Skipped`] when it has not.
+    /// [`Failure::Skipped`] when it has not; [`Failure::Failed`] when there is no such interpreter.
     pub fn require(&self, imports: &str) -> Result<(), Failure> {
-        let said = self.says(&format!("import {imports}"));
         let name = self.program.display();
-        said.map(drop).map_err(|why| {
+        self.says(&format!("import {imports}"))?.map(drop).map_err(|why| {
             Failure::Skipped(format!("{name} cannot `import {imports}` ({why}); name one that can with --python"))
         })
     }
 
     /// Of itself, and of what is measured in it, for people; empty without an interpreter.
     pub fn versions(&self) -> Vec<String> {
-        self.says(VERSIONS).unwrap_or_default().lines().map(str::to_owned).collect()
+        let said = self.says(VERSIONS).ok().and_then(Result::ok).unwrap_or_default();
+        said.lines().map(str::to_owned).collect()
     }
 
     /// What a script prints, or the last line of what is wrong.
-    fn says(&self, script: &str) -> Result<String, String> {
+    fn says(&self, script: &str) -> Result<Result<String, String>, Failure> {
         let mut command = Command::new(&self.program);
         command.args(["-B", "-c", script]).envs(self.variables());
-        let output = command.output().map_err(|error| error.to_string())?;
+        let output = command.output().map_err(|error| Failure::of(&self.program.display().to_string(), error))?;
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
         if output.status.success() {
-            return Ok(text(&output.stdout));
+            return Ok(Ok(text(&output.stdout)));
         }
-        Err(text(&output.stderr).lines().last().unwrap_or_default().to_owned())
+        Ok(Err(text(&output.stderr).lines().last().unwrap_or_default().to_owned()))
     }
 }
 

@@ -58,6 +58,9 @@ fn a_program_that_fails_is_told_with_its_own_words() {
     let (right, wrong): (Vec<_>, Vec<_>) = notes.partition(|line| line.contains("it ended with 7; it is broken"));
     assert!(right.len() >= 2 && wrong.is_empty(), "{right:#?} {wrong:#?}");
     assert_eq!(left_behind(&prefix), [""; 0]);
+    let (output, _) = run("languages", &["--quick", "--only", "Python, data", "--python", "/no/such/python"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("FAILED: /no/such/python: No such file"), "{text}");
 }
 
 #[test]

@@ -60,6 +60,9 @@ optional = true
 [module.stream.image]
 record = "8 MiB"
 keep = 4
+[module.stream.bare]
+record = "8 MiB"
+keep = 4
 [[module]]
 name = "looker.0"
 program = "looker"
@@ -159,9 +162,9 @@ struct Picture {
 
 impl Picture {
     /// Microseconds of each.
-    fn turn(&self, cell: &Cell, python: &Interpreter, size: [usize; 2]) -> Result<Vec<f64>, Failure> {
+    fn turn(&self, cell: &Cell, python: &Interpreter, (size, stream): ([usize; 2], &str)) -> Result<Vec<f64>, Failure> {
         let (place, [width, height]) = (Place::new()?, size.map(|pixels| pixels.to_string()));
-        let program = place.runs(python, "picture.py", &[&width, &height])?;
+        let program = place.runs(python, "picture.py", &[&width, &height, stream])?;
         time_two_programs(cell, &place.scratch, |_| program.clone())
     }
 
@@ -186,12 +189,13 @@ impl Case for Picture {
             return Ok(vec![Row::alone(subject, "Python", Err(skipped))]);
         }
         let mut contenders = vec![
-            Contender::sampled("Python", || self.turn(&cell, &python, self.size)),
+            Contender::sampled("Python", || self.turn(&cell, &python, (self.size, "image"))),
             Contender::sampled("iceoryx2", || self.iceoryx(&cell, &python)),
+            Contender::sampled("Python, pixels alone", || self.turn(&cell, &python, (self.size, "bare"))),
         ];
         let mut versus = vec![at_most("iceoryx2", OF_PEERS)];
         if self.size != SIZES[0] {
-            contenders.push(Contender::sampled("1920 x 1080", || self.turn(&cell, &python, SIZES[0])));
+            contenders.push(Contender::sampled("1920 x 1080", || self.turn(&cell, &python, (SIZES[0], "image"))));
             versus.push(at_most("1920 x 1080", OF_SMALLER));
         }
         let subject = Subject { case: self.name(), bytes: Some(self.size.iter().product()), unit: "us" };
