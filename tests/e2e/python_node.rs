@@ -198,6 +198,7 @@ fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
     let set = scene.says(&["param", "set", "gripper.0", "gain", "7"]).fails();
     assert!(set.contains("the module refuses: not seven"), "{set}");
     assert_eq!(scene.says(&["param", "get", "gripper.0", "gain", "--json"]).json()[0]["value"], 2);
+    assert_eq!(answers(&scene, "gains").trim(), "2", "the module has its old value again");
     // It still sees.
     let seen: u32 = answers(&scene, "sees").trim().parse().unwrap();
     wait("it sees", || (answers(&scene, "sees").trim().parse::<u32>().unwrap() > seen).then_some(()));

@@ -139,6 +139,11 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         """What it heard."""
         return self.heard + ", " + said(lambda: self.watch(-1, print))
 
+    @rp.command(28)
+    def gains(self) -> rp.U8:
+        """What it reckons with."""
+        return self.gain
+
     @rp.command(25)
     def sees(self) -> rp.U32:
         """Pictures so far."""
