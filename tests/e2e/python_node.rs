@@ -35,6 +35,7 @@ calls = ["motor.0", "odometry.0", "camera.0"]
 settings = { SETTINGS }
 [module.stream.edge]
 record = "1 MiB"
+STREAMS
 [[module]]
 name = "motor.0"
 aliases = ["odometry.0", "laser.0", "camera.0"]
@@ -72,6 +73,12 @@ fn package(place: &Place) -> PathBuf {
     path
 }
 
+/// With a section for each stream that this program has.
+fn configured(map: &str, settings: &str, code: &str) -> String {
+    let streams = if code == FAULTY { "[module.stream.wide]\nrecord = \"64 KiB\"\n" } else { "" };
+    CONFIG.replace("MAP", map).replace("SETTINGS", settings).replace("STREAMS", streams)
+}
+
 /// The book's gripper.
 fn gripper() -> &'static str {
     PAGE.split("```python gripper.py\n").nth(1).unwrap().split("```").next().unwrap()
@@ -84,7 +91,7 @@ impl Scene {
         let package = package(&place);
         let (config, program) = (place.path("robot.toml"), place.path("gripper.py"));
         let map = format!("{:?}", repository().join("config/building.map"));
-        std::fs::write(&config, CONFIG.replace("MAP", &map).replace("SETTINGS", settings)).unwrap();
+        std::fs::write(&config, configured(&map, settings, code)).unwrap();
         std::fs::write(&program, code).unwrap();
         std::fs::set_permissions(&program, PermissionsExt::from_mode(0o755)).unwrap();
         let mut command = place.command(&["launch", config.to_str().unwrap()]);
@@ -198,6 +205,7 @@ fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
     let set = scene.says(&["param", "set", "gripper.0", "gain", "7"]).fails();
     assert!(set.contains("the module refuses: not seven"), "{set}");
     assert_eq!(scene.says(&["param", "get", "gripper.0", "gain", "--json"]).json()[0]["value"], 2);
+    assert_eq!(answers(&scene, "gains").trim(), "2", "the module has its old value again");
     // It still sees.
     let seen: u32 = answers(&scene, "sees").trim().parse().unwrap();
     wait("it sees", || (answers(&scene, "sees").trim().parse::<u32>().unwrap() > seen).then_some(()));
@@ -228,6 +236,15 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
     }
     scene.says(&["call", "gripper.0", "hears", "tick"]).ok();
     wait("it hears", || answers(&scene, "heard_word").contains("tick, Misuse: -1 is no open").then_some(()));
+    let notes = answers(&scene, "notes");
+    for words in
+        ["Misuse: a record is being filled", "RuntimeError: no", "Misuse: a view of a record of `wide` that is"]
+    {
+        assert!(notes.contains(words), "{words}: {notes}");
+    }
+    let noted = scene.says(&["stream", "read", "gripper.0", "note"]).ok();
+    assert!(noted.contains("{words: \"filled\", more: [97, 98, 99, 100]}"), "{noted}");
+    assert_eq!((scene.written("note"), scene.written("wide")), (2, 0));
     let looks = answers(&scene, "looks");
     for words in [
         "memoryview of ",
@@ -247,7 +264,7 @@ fn by_hand_it_says_why_it_does_not_start_and_ends_by_control_c() {
     let (package, config) = (package(&place), place.path("robot.toml"));
     std::fs::write(place.path("gripper.py"), FAULTY).unwrap();
     let started = |settings: &str, arguments: &[&str]| {
-        std::fs::write(&config, CONFIG.replace("MAP", "\"no.map\"").replace("SETTINGS", settings)).unwrap();
+        std::fs::write(&config, configured("\"no.map\"", settings, FAULTY)).unwrap();
         let mut command = Command::new("python3");
         command.arg("-B").arg("gripper.py").args(arguments).current_dir(place.path(""));
         command.env("PYTHONPATH", &package).env("ROHRPOST_DIR", place.memory());

@@ -10,6 +10,7 @@ import os
 import pathlib
 import shutil
 import sys
+import sysconfig
 from typing import Any
 
 _FOLDER = pathlib.Path(__file__).parents[1]
@@ -27,6 +28,8 @@ def _wheels() -> Any:
     if _has_rust():
         import maturin
 
+        # It runs the program of its name, which is not on everybody's path.
+        os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", "")])
         return maturin
     import hatchling.build
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import pickle
 import threading
 import unittest
 from collections.abc import Callable
@@ -105,6 +106,10 @@ class Nodes(unittest.TestCase):
         kept = held.value.pixels[1:3]
         self.assertFalse(held.release(), "a slice is kept")
         self.assertEqual(bytes(kept), pixels[1:3], "and still leads there")
+        held = Held(type_of(rp.Image), cast(Any, memory))
+        lent = pickle.PickleBuffer(held.value.pixels)
+        self.assertFalse(held.release(), "somebody else has it, as an array of numpy would")
+        self.assertEqual(lent.raw()[:3], pixels[:3])
 
     def test_short_bytes_are_copied_and_wrong_ones_refused(self) -> None:
         held = Held(type_of(bytes), cast(Any, Memory(b"\3abc")))

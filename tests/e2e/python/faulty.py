@@ -10,6 +10,14 @@ import threading
 import rohrpost as rp
 
 
+@rp.data
+class Note:
+    """Words, and bytes."""
+
+    words: str
+    more: bytes
+
+
 def said(part) -> str:
     """What a mistake says."""
     try:
@@ -138,6 +146,35 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
     def heard_word(self) -> str:
         """What it heard."""
         return self.heard + ", " + said(lambda: self.watch(-1, print))
+
+    @rp.command(28)
+    def gains(self) -> rp.U8:
+        """What it reckons with."""
+        return self.gain
+
+    @rp.command(29)
+    def notes(self) -> list[str]:
+        """Small records, which do not lie in place; one that is given up, and one whose view is kept."""
+        self.write("note", Note("whole", b"xyz"))
+        with self.begin("note", Note("filled", b""), 4) as room:
+            room[:] = b"abcd"
+            told = [said(lambda: self.write("note", Note("between", b"")))]
+
+        def given_up(keeps: bool) -> None:
+            with self.begin("wide", Note("given up", b""), 5000) as room:
+                self.kept = room[1:] if keeps else None
+                if not keeps:
+                    raise RuntimeError("no")
+
+        return [*told, said(lambda: given_up(False)), said(lambda: given_up(True))]
+
+    @rp.stream(3)
+    def note(self) -> "Note":
+        """What it notes."""
+
+    @rp.stream(4)
+    def wide(self) -> "Note":
+        """The same, with more room."""
 
     @rp.command(25)
     def sees(self) -> rp.U32:

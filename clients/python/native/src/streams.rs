@@ -13,6 +13,9 @@ use std::time::Duration;
 /// Sequence, stamp (ns), epoch, and the value as `bytes` or `Shared`.
 type RecordParts = (u64, u64, u64, Py<PyAny>);
 
+/// Sequence and stamp (ns) of a record.
+type Mark = (u64, u64);
+
 /// A stream of another module. `rohrpost.node.streams` sees to it that its own thread alone uses it.
 #[pyclass(unsendable, module = "rohrpost._node")]
 pub(crate) struct Stream(NativeStream);
@@ -56,7 +59,7 @@ impl Stream {
     }
 
     /// Sequence and stamp of the records around a time; or in words why there are none.
-    fn around(&mut self, py: Python<'_>, stamp_ns: u64) -> PyResult<(Option<[(u64, u64); 2]>, &'static str)> {
+    fn around(&mut self, py: Python<'_>, stamp_ns: u64) -> PyResult<(Option<[Mark; 2]>, &'static str)> {
         let around = self.0.around(Moment::Ns(stamp_ns)).map_err(|error| failure(py, NativeError::Read(error)))?;
         Ok(match around {
             Around::Records { before, after } => (Some([before, after].map(|info| (info.sequence, info.stamp.ns))), ""),

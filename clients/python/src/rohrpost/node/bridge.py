@@ -196,6 +196,8 @@ class Bridge(NodeHost):
             yield memoryview(own) if view is None else view.whole
         except BaseException:
             _node.abandon()
+            if view is not None:
+                view.release()
             raise
         if view is not None and not view.release():
             _node.abandon()
