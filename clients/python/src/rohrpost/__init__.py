@@ -1,7 +1,8 @@
 """Rohrpost for Python: modules of robots, from any computer. :mod:`rohrpost.remote` takes part at a TCP router."""
 
 from .annotations import (
-    F32, F64, I8, I16, I32, I64, I128, U8, U16, U32, U64, U128, Char, Choice, Length, data, said,
+    F32, F64, I8, I16, I32, I64, I128, U8, U16, U32, U64, U128, Char, Choice, Length, data, inline, maybe, said,
+    wrapped,
 )  # fmt: skip
 from .common import OutputLevel, State, Status
 from .errors import (
@@ -9,7 +10,7 @@ from .errors import (
     RohrpostError, TooManyCalls,
 )  # fmt: skip
 from .faults import Fault
-from .interface import Module, command, data_out, on_data, parameter
+from .interface import Module, command, data_out, on_data, parameter, stream
 from .names import BadName, Installation, Name
 from .schema import Variant
 from .types import Image, ImageFormat, LaserScan, Odometry, Pose, Twist
@@ -19,5 +20,6 @@ __all__ = [
     "Fault", "FunctionError", "I8", "I16", "I32", "I64", "I128", "Image", "ImageFormat", "Installation", "LaserScan",
     "Length", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry", "OutputLevel", "Pose",
     "RohrpostError", "State", "Status", "TooManyCalls", "Twist", "U8", "U16", "U32", "U64", "U128", "Variant",
-    "command", "data", "data_out", "on_data", "parameter", "said",
+    "command", "data", "data_out", "inline", "maybe", "on_data", "parameter", "said", "stream",
+    "wrapped",
 ]  # fmt: skip

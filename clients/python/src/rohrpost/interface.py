@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, TypeVar
 
 from .annotations import bound_of, field_of, first_paragraph, hints_of, said, type_of
@@ -29,6 +29,7 @@ class Command:
     number: int
     idempotent: bool
     error: Any
+    name: str
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,16 @@ class DataOut:
     number: int
     rate_hz: float | None
     unit: str
+    name: str
+
+
+@dataclass(frozen=True)
+class StreamOut:
+    """What :func:`stream` says."""
+
+    number: int
+    unit: str
+    name: str
 
 
 @dataclass(frozen=True)
@@ -50,25 +61,34 @@ class OnData:
     newest: bool
 
 
-def command(number: int, *, idempotent: bool = False, error: Any = None) -> Callable[[F], F]:
+def command(number: int, *, idempotent: bool = False, error: Any = None, name: str = "") -> Callable[[F], F]:
     """A function that others call, by its number, 16 and above.
 
     ``idempotent``: running it twice does no harm. ``error``: the type of its own errors, which it returns by raising
-    :class:`rohrpost.FunctionError`.
+    :class:`rohrpost.FunctionError`. ``name``: what others know it by, where Python cannot have that name, such as
+    ``raise``.
     """
     if not FIRST_OWN <= number <= COMMAND_MAX:
         raise Misuse(f"command {number}: numbers of own commands are {FIRST_OWN} to {COMMAND_MAX}")
-    return _marked(Command(number, idempotent, error))
+    return _marked(Command(number, idempotent, error, name))
 
 
-def data_out(number: int, *, rate_hz: float | None = None, unit: str = "") -> Callable[[F], F]:
+def data_out(number: int, *, rate_hz: float | None = None, unit: str = "", name: str = "") -> Callable[[F], F]:
     """Data that others ask for and subscribe to. With ``rate_hz`` the function is run so often while the module is on,
-    and what it returns is published; else ``self.publish`` does."""
+    and what it returns is published; else ``self.publish`` does. ``name``: as of :func:`command`."""
     if not 0 <= number <= DATA_MAX:
         raise Misuse(f"data {number}: numbers of data are 0 to {DATA_MAX}")
     if rate_hz is not None and not 0 < rate_hz <= 10_000:
         raise Misuse(f"data {number}: `rate_hz` is above 0 and at most 10000, not {rate_hz}")
-    return _marked(DataOut(number, rate_hz, unit))
+    return _marked(DataOut(number, rate_hz, unit, name))
+
+
+def stream(number: int, *, unit: str = "", name: str = "") -> Callable[[F], F]:
+    """What the interface calls a stream, by its name and the type that the function returns; it is never run. Through
+    the TCP router others follow its values as data, which ``self.publish`` publishes."""
+    if not 0 <= number <= DATA_MAX:
+        raise Misuse(f"stream {number}: numbers of streams are 0 to {DATA_MAX}")
+    return _marked(StreamOut(number, unit, name))
 
 
 def on_data(publisher: str, data: str, *, period_s: float = 0.0, newest: bool = False) -> Callable[[F], F]:
@@ -80,7 +100,7 @@ def on_data(publisher: str, data: str, *, period_s: float = 0.0, newest: bool = 
     return _marked(OnData(publisher, data, period_s, newest))
 
 
-def _marked(mark: Command | DataOut | OnData) -> Callable[[F], F]:
+def _marked(mark: Command | DataOut | StreamOut | OnData) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         setattr(function, _MARK, mark)
         return function
@@ -107,7 +127,7 @@ class Parameter:
                 f"{owner}.{self.name}: a parameter needs its type, such as `{self.name}: float = parameter(…)`"
             )
         type = type_of(annotation, f"{owner}.{self.name}")
-        least, most = (bound_of(type, it, owner, self.name) for it in (self._words.min, self._words.max))
+        least, most = (bound_of(type, it, f"{owner}.{self.name}") for it in (self._words.min, self._words.max))
         self.field = Field(self.name.replace("_", "-"), type, self._words.text, self._words.unit, least, most)
         self.check(self.default, owner)
 
@@ -189,7 +209,8 @@ class Module:
             def close(self, force_n: float) -> Grip: ...
 
     ``klass``: the class in the configuration. ``interface``: name of the interface, if not that of the class. Its
-    functions run one after the other, so they need no locks among themselves.
+    functions run one after the other, so they need no locks among themselves. A class below another has its interface,
+    and gives functions that it has bodies of its own; what stands at them in the base holds.
     """
 
     interface_: ClassVar[Interface]
@@ -200,6 +221,7 @@ class Module:
         base: Interface | None = getattr(cls, "interface_", None)
         if klass is None and base is not None:
             klass = base.description.klass
+            interface = interface or base.description.name
         if klass is None:
             raise Misuse(f'{cls.__name__}: of which class is it? write `class {cls.__name__}(Module, klass="…")`')
         cls.interface_ = _interface(cls, klass, interface or cls.__name__)
@@ -229,12 +251,30 @@ class Module:
         return self._host
 
 
+def _marks(cls: type) -> list[tuple[str, Any, Any]]:
+    """Names of marked functions, what stands at each, and the function at which it stands: of a base, where the class
+    gives it another body."""
+    found = {}
+    for base in reversed(cls.__mro__):
+        for key, value in vars(base).items():
+            if hasattr(value, _MARK):
+                found[key] = (key, getattr(value, _MARK), value)
+            elif key in found and not callable(value):
+                del found[key]
+    return sorted(found.values(), key=lambda it: it[0])
+
+
 def _interface(cls: type, klass: str, name: str) -> Interface:
-    marked = [(key, getattr(value, _MARK)) for key, value in inspect.getmembers(cls) if hasattr(value, _MARK)]
+    all_marked = _marks(cls)
+    declared = {key: function for key, _, function in all_marked}
+    marked = [(key, mark) for key, mark, _ in all_marked]
     commands = [(key, mark) for key, mark in marked if isinstance(mark, Command)]
     outputs = [(key, mark) for key, mark in marked if isinstance(mark, DataOut)]
-    functions = tuple(_function(cls, key, mark) for key, mark in sorted(commands, key=lambda it: it[1].number))
-    data = tuple(_data(cls, key, mark) for key, mark in sorted(outputs, key=lambda it: it[1].number))
+    commands.sort(key=lambda it: it[1].number)
+    functions = tuple(_function(cls, key, mark, declared[key]) for key, mark in commands)
+    given = [(key, mark) for key, mark in marked if isinstance(mark, (DataOut, StreamOut))]
+    given.sort(key=lambda it: it[1].number)
+    data = tuple(_data(cls, key, mark, declared[key]) for key, mark in given)
     for what, numbers in (("command", [it.number for it in functions]), ("data", [it.number for it in data])):
         twice = {number for number in numbers if numbers.count(number) > 1}
         if twice:
@@ -242,7 +282,8 @@ def _interface(cls: type, klass: str, name: str) -> Interface:
     made = Interface(Description(name, klass, functions, data, first_paragraph(cls.__doc__)))
     made.commands = {mark.number: Handler(key, mark) for key, mark in commands}
     made.outputs = {mark.number: Handler(key, mark) for key, mark in outputs}
-    made.inputs = [Handler(key, mark, _input(cls, key)) for key, mark in marked if isinstance(mark, OnData)]
+    inputs = [(key, mark) for key, mark in marked if isinstance(mark, OnData)]
+    made.inputs = [Handler(key, mark, _input(cls, key, declared[key])) for key, mark in inputs]
     hints = hints_of(cls) if any(isinstance(it, Parameter) for it in vars(cls).values()) else {}
     for base in reversed(cls.__mro__):
         for value in vars(base).values():
@@ -253,8 +294,7 @@ def _interface(cls: type, klass: str, name: str) -> Interface:
     return made
 
 
-def _arguments(cls: type, name: str) -> tuple[list[str], dict[str, Any]]:
-    function = getattr(cls, name)
+def _arguments(cls: type, name: str, function: Any) -> tuple[list[str], dict[str, Any]]:
     arguments = list(inspect.signature(function).parameters.values())[1:]
     for argument in arguments:
         if argument.kind not in (argument.POSITIONAL_ONLY, argument.POSITIONAL_OR_KEYWORD):
@@ -262,8 +302,8 @@ def _arguments(cls: type, name: str) -> tuple[list[str], dict[str, Any]]:
     return [argument.name for argument in arguments], hints_of(function)
 
 
-def _function(cls: type, name: str, mark: Command) -> Function:
-    arguments, hints = _arguments(cls, name)
+def _function(cls: type, name: str, mark: Command, function: Any) -> Function:
+    arguments, hints = _arguments(cls, name, function)
     where = f"{cls.__name__}.{name}"
     for argument in (*arguments, "return"):
         if argument not in hints:
@@ -272,21 +312,22 @@ def _function(cls: type, name: str, mark: Command) -> Function:
     result = type_of(hints["return"], where)
     if mark.error is not None:
         result = result_of(result, type_of(mark.error, where))
-    text = first_paragraph(getattr(cls, name).__doc__)
-    return Function(mark.number, name, fields, result, text, mark.idempotent)
+    text = first_paragraph(function.__doc__)
+    return Function(mark.number, mark.name or name, fields, result, text, mark.idempotent)
 
 
-def _data(cls: type, name: str, mark: DataOut) -> DataItem:
-    arguments, hints = _arguments(cls, name)
+def _data(cls: type, name: str, mark: DataOut | StreamOut, function: Any) -> DataItem:
+    arguments, hints = _arguments(cls, name, function)
     where = f"{cls.__name__}.{name}"
     if arguments or "return" not in hints:
         raise Misuse(f"{where}: data take no arguments, and need the annotation of what they return")
-    text = first_paragraph(getattr(cls, name).__doc__)
-    return DataItem(mark.number, Field(name, type_of(hints["return"], where), text, mark.unit))
+    field = field_of(mark.name or name, hints["return"], where)
+    text = field.text or first_paragraph(function.__doc__)
+    return DataItem(mark.number, replace(field, text=text, unit=mark.unit or field.unit), isinstance(mark, StreamOut))
 
 
-def _input(cls: type, name: str) -> Type | None:
-    arguments, hints = _arguments(cls, name)
+def _input(cls: type, name: str, function: Any) -> Type | None:
+    arguments, hints = _arguments(cls, name, function)
     if len(arguments) != 1:
         raise Misuse(f"{cls.__name__}.{name}: it takes one argument, the value")
     annotation = hints.get(arguments[0])

@@ -370,7 +370,7 @@ class Hosted:
             tick.is_queued = False
             try:
                 if error is None and self.state is State.On:
-                    self.publish(now_ns, tick.handler.name, value, stamp_ns)
+                    self.publish(now_ns, tick.handler.mark.name or tick.handler.name, value, stamp_ns)
             except Misuse as wrong:
                 error = wrong
             self._noticed(error)
