@@ -175,7 +175,8 @@ pub(super) fn usage(function: &Function) -> String {
     format!("{}{}", plain::line(&function.name), arguments.concat())
 }
 
-fn listing(description: &Description) -> String {
+/// What a module offers, for people.
+pub(super) fn listing(description: &Description) -> String {
     let mut text = format!("class {}: {}\n", plain::line(&description.class), plain::line(&description.text));
     if !description.functions.is_empty() {
         text.push_str("\nfunctions\n");

@@ -4,7 +4,7 @@ use clap::Command;
 
 /// Headings and their subcommands, in the order in which a newcomer needs them.
 const GROUPS: [(&str, &[&str]); 7] = [
-    ("To begin", &["demo", "new", "check", "launch"]),
+    ("To begin", &["demo", "new", "interface", "check", "launch"]),
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
     ("One of its modules", &["restart", "stop", "start"]),
     ("To measure", &["hz", "bw", "delay", "mailbox", "stream", "graph", "ping", "send", "record", "replay"]),

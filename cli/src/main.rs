@@ -26,6 +26,7 @@ mod flows;
 mod graph;
 mod help;
 mod hz;
+mod interface;
 mod keys;
 mod launch;
 mod list;
@@ -139,6 +140,8 @@ enum Command {
     Keys(keys::Arguments),
     /// Begin a module of your own: a project that builds and runs.
     New(new::Arguments),
+    /// Write interfaces to files, and typed code of them.
+    Interface(interface::Arguments),
     /// Print a script by which a shell completes what you type.
     Completions(completions::Arguments),
     /// Print versions, of this program and of what nodes share.
@@ -188,6 +191,7 @@ fn main() -> ExitCode {
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Keys(arguments) => keys::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
+        Command::Interface(arguments) => interface::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),

@@ -88,7 +88,7 @@ pub trait Scale {
 fn a_stream_is_described_among_data_and_has_a_port_of_its_own() {
     let description = ScaleInterface::description();
     let kinds: Vec<_> = description.data.iter().map(|item| (item.number, item.kind)).collect();
-    assert_eq!(kinds, [(2, DataKind::Data), (1, DataKind::Stream)]);
+    assert_eq!(kinds, [(1, DataKind::Stream), (2, DataKind::Data)], "by number, however they are written");
     let streams: Vec<_> = description.streams().map(|item| describe_field(&item.field)).collect();
     assert_eq!(streams, ["mass: f64 kg"]);
     assert_eq!(Description::from_bytes(&description.to_bytes()), Ok(description));

@@ -175,6 +175,11 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
     };
     assert_eq!(set("0.1").ok(), "gripper.0 speed-m-s: 0.05 -> 0.1 m/s\n");
     assert!(set("0.3").fails().contains("out of range: 0..=0.2"));
+    let export = ["interface", "export", "gripper.0", "--json", "--config", config.to_str().unwrap(), "--node", "base"];
+    let file = scene.place.path("gripper.json");
+    std::fs::write(&file, scene.place.say(&export).ok()).unwrap();
+    let code = scene.place.say(&["interface", "generate", "--lang", "rust", file.to_str().unwrap()]).ok();
+    assert!(code.contains("fn close(&mut self, force_n: f64) -> Result<Grip, String>;"), "{code}");
     // The TCP router is killed; the program in Python comes back by itself, the same one.
     signal(scene.robot.pid("tcp.255"), Signal::SIGKILL);
     wait("it is called again", || closes().out.contains("width_m").then_some(()));

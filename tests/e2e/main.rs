@@ -29,6 +29,7 @@ mod graph;
 mod harness;
 mod hostile;
 mod hostile_texts;
+mod interface;
 mod lan;
 mod lan_tools;
 mod languages;

@@ -6,6 +6,7 @@ use crate::said::Said;
 use crate::text::text_of;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
+use syn::ext::IdentExt;
 use syn::parse::{Parse, ParseStream};
 use syn::spanned::Spanned;
 use syn::{
@@ -127,6 +128,9 @@ pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<Token
         }
     }
     item.items = kept;
+    // A description has them by number, however they are written here.
+    commands.sort_by_key(|command| command.number.number.base10_parse::<u16>().unwrap_or_default());
+    data.sort_by_key(|item| item.number.base10_parse::<u16>().unwrap_or_default());
     distinct(commands.iter().map(|command| &command.number.number))?;
     distinct(data.iter().map(|item| &item.number))?;
     distinct_names(commands.iter().map(|command| &command.name).chain(data.iter().map(|item| &item.name)))?;
@@ -177,6 +181,11 @@ fn command(number: Number, function: &mut TraitItemFn) -> Result<Command> {
     owned(&result, "results travel to another process; return an owned value")?;
     let text = text_of(&function.attrs);
     Ok(Command { number, name: function.sig.ident.clone(), text, names, types, said, result })
+}
+
+/// As it is told to others: without the `r#` of a name that is a keyword here.
+fn plain_name(name: &Ident) -> String {
+    name.unraw().to_string()
 }
 
 /// Nothing that another process could not see or wait for.
@@ -231,7 +240,7 @@ fn distinct<'a>(numbers: impl Iterator<Item = &'a LitInt>) -> Result<()> {
 fn distinct_names<'a>(names: impl Iterator<Item = &'a Ident>) -> Result<()> {
     let mut seen = Vec::new();
     for name in names {
-        let text = name.to_string();
+        let text = plain_name(name);
         if ["new", "with_timeout"].contains(&text.as_str()) {
             return Err(Error::new(name.span(), format!("`{text}` is a function of every proxy; choose another name")));
         }
@@ -252,14 +261,14 @@ fn interface(
 ) -> Result<TokenStream> {
     let (vis, name) = (&item.vis, &item.ident);
     let interface = format_ident!("{name}Interface");
-    let (trait_name, trait_text) = (name.to_string(), text_of(&item.attrs));
+    let (trait_name, trait_text) = (name.unraw().to_string(), text_of(&item.attrs));
     let doc = format!(
         "The interface [`{name}`]: what a module names as its own. Its constants are the data and streams it publishes."
     );
     let schema = &quote!(#krate::schema);
     let functions = commands.iter().map(|command| {
         let Command { number: Number { number, idempotent }, name, text, names, types, said, result } = command;
-        let (name, names) = (name.to_string(), names.iter().map(Ident::to_string));
+        let (name, names) = (plain_name(name), names.iter().map(plain_name));
         let arguments = names.zip(types).zip(said).map(|((name, ty), said)| said.field(schema, &name, "", ty));
         quote! {
             #schema::Function {
@@ -270,22 +279,22 @@ fn interface(
         }
     });
     let items = data.iter().map(|Data { kind, number, name, text, ty, said }| {
-        let (kind, field) = (kind.variant(schema), said.field(schema, &name.to_string(), text, ty));
+        let (kind, field) = (kind.variant(schema), said.field(schema, &plain_name(name), text, ty));
         quote!(#schema::DataItem { number: #number, kind: #kind, field: #field })
     });
     let of_arguments = commands.iter().flat_map(|command| command.names.iter().zip(&command.types).zip(&command.said));
     let proofs = of_arguments.map(|((name, ty), said)| said.proof(&name.to_string(), ty));
     let proofs = proofs.chain(data.iter().map(|item| item.said.proof(&item.name.to_string(), &item.ty)));
     let ports = data.iter().map(|Data { kind, number, name, text, ty, .. }| {
-        let constant = Ident::new(&name.to_string().to_uppercase(), name.span());
-        let name = name.to_string();
+        let name_text = plain_name(name);
+        let constant = Ident::new(&name_text.to_uppercase(), name.span());
         let port = match kind {
             DataKind::Data => quote!(#krate::DataPort),
             DataKind::Stream => quote!(#krate::StreamPort),
         };
         quote! {
             #[doc = #text]
-            pub const #constant: #port<#ty> = #port::new(#class, #number, #name, Self::hash);
+            pub const #constant: #port<#ty> = #port::new(#class, #number, #name_text, Self::hash);
         }
     });
     let arms = commands.iter().map(|command| {

@@ -80,3 +80,30 @@ fn mistakes_in_the_attribute_are_told() {
     );
     assert!(expand(quote!(class = "motor"), item).is_ok(), "an interface may be empty");
 }
+
+#[test]
+fn names_that_are_keywords_are_told_without_their_mark() {
+    let item = "trait T {
+        #[command(16)] fn r#continue(&mut self, r#in: u8);
+        #[data(1)] fn r#type() -> u8;
+    }";
+    let written = expand(quote!(class = "odd"), item.parse().unwrap()).unwrap().to_string();
+    for told in ["\"continue\"", "\"in\"", "\"type\"", "const TYPE"] {
+        assert!(written.contains(told), "{told}: {written}");
+    }
+    assert!(!written.contains("\"r#"), "{written}");
+}
+
+#[test]
+fn a_description_has_functions_and_data_by_number() {
+    let item = "trait T {
+        #[command(30)] fn later(&mut self);
+        #[command(16)] fn first(&mut self);
+        #[stream(3)] fn third() -> u8;
+        #[data(2)] fn second() -> u8;
+    }";
+    let written = expand(quote!(class = "odd"), item.parse().unwrap()).unwrap().to_string();
+    let described = written.split("fn description").nth(1).unwrap();
+    let at = |name: &str| described.find(&format!("\"{name}\"")).unwrap();
+    assert!(at("first") < at("later") && at("later") < at("second") && at("second") < at("third"), "{described}");
+}

@@ -2,7 +2,8 @@
 part at a TCP router."""
 
 from .annotations import (
-    F32, F64, I8, I16, I32, I64, I128, U8, U16, U32, U64, U128, Char, Choice, Length, data, said,
+    F32, F64, I8, I16, I32, I64, I128, U8, U16, U32, U64, U128, Char, Choice, Length, data, inline, maybe, said,
+    wrapped,
 )  # fmt: skip
 from .common import OutputLevel, State, Status
 from .errors import (
@@ -10,7 +11,8 @@ from .errors import (
     RohrpostError, TooManyCalls,
 )  # fmt: skip
 from .faults import Fault
-from .interface import Module, command, data_out, every, on_data, on_record, parameter, stream
+from .interface import Module, parameter
+from .marks import command, data_out, every, on_data, on_record, stream
 from .names import BadName, Installation, Name
 from .node import is_available, run
 from .picture import BadPicture
@@ -22,6 +24,6 @@ __all__ = [
     "F32", "F64", "Fault", "FunctionError", "I8", "I16", "I32", "I64", "I128", "Image", "ImageFormat", "Installation",
     "LaserScan", "Length", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry", "OutputLevel", "Pose",
     "RohrpostError", "State", "Status", "TooManyCalls", "Twist", "U8", "U16", "U32", "U64", "U128", "Variant",
-    "command", "data", "data_out", "every", "is_available", "on_data", "on_record", "parameter", "run", "said",
-    "stream",
+    "command", "data", "data_out", "every", "inline", "is_available", "maybe", "on_data", "on_record", "parameter", "run",
+    "said", "stream", "wrapped",
 ]  # fmt: skip

@@ -8,6 +8,8 @@
 | ``Annotated[list[T], Length(3)]`` | array |
 | a class with :func:`data`: with fields, or an ``enum.Enum`` | struct, enum |
 | a :class:`Choice` | enum of which variants carry something |
+| ``Annotated[float, wrapped("Meters")]``, ``Annotated[tuple[A, B], wrapped("Pair"), inline]`` | struct without names |
+| ``Annotated[T | None, maybe]`` | option of an option |
 
 ``Annotated[float, said(unit="m/s", min=0.0, text="Forward.")]`` says more of a field or an argument.
 """
@@ -17,6 +19,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import inspect
+import operator
 import types
 import typing
 from collections.abc import Callable
@@ -71,12 +74,34 @@ class Length:
 @dataclass(frozen=True)
 class said:
     """What an author says of a field or an argument besides its type. ``unit`` counts in the interface's hash, the
-    range and the text do not."""
+    range and the text do not. ``name``: what others know it by, where Python cannot have that name, such as `from`."""
 
     unit: str = ""
     min: Any = None
     max: Any = None
     text: str = ""
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class wrapped:
+    """A struct of this name around one value that has no name: it adds no byte, and values are as without it. With
+    :data:`inline` behind it, around the elements of a ``tuple``."""
+
+    name: str
+    text: str = ""
+
+
+class _Marker(enum.Enum):
+    INLINE = "inline"
+    MAYBE = "maybe"
+
+
+inline = _Marker.INLINE
+"""Of a struct by :class:`wrapped`, or a variant of a :class:`Choice`: it has the elements of the ``tuple``, or the
+fields of the class, as its own members."""
+maybe = _Marker.MAYBE
+"""An option of this, which may itself be ``None``: its values are ``None`` and ``Variant("Some", value)``."""
 
 
 class Choice:
@@ -88,13 +113,15 @@ class Choice:
 
         DriveError("Hardware", "no answer")
 
-    ``name``: what others know it by, if not the class's own name.
+    ``name``: what others know it by, if not the class's own name. ``variants``: instead of annotations, where Python
+    cannot have the names: ``variants={"None": None, "turn-left": float}``.
     """
 
-    def __init_subclass__(cls, name: str | None = None) -> None:
+    def __init_subclass__(cls, name: str | None = None, variants: dict[str, Any] | None = None) -> None:
         super().__init_subclass__()
-        variants = tuple(_variant(cls, *it) for it in _hints(cls).items())
-        setattr(cls, _ATTRIBUTE, tree.Enum(name or cls.__name__, variants, _text(cls), cls))
+        hints = _hints(cls) if variants is None else variants
+        made = tuple(_variant(cls, *it) for it in hints.items())
+        setattr(cls, _ATTRIBUTE, tree.Enum(name or cls.__name__, made, _text(cls), cls))
 
     def __init__(self, name: str, value: Any = None) -> None:
         variants = getattr(self, _ATTRIBUTE).variants
@@ -138,16 +165,44 @@ def data(cls: type[T] | None = None, *, name: str | None = None) -> Any:
             made_class: Any = cls if "__dataclass_fields__" in cls.__dict__ else dataclass(cls)
             hints = _hints(made_class)
             fields = tuple(field_of(it.name, hints[it.name], cls.__name__) for it in dataclasses.fields(made_class))
-            made = tree.Struct(Named(known, 3 if fields else 0, fields, _text(cls)), made_class)
+            own = {field.name: it.name for field, it in zip(fields, dataclasses.fields(made_class))}
+            made = tree.Struct(Named(known, 3 if fields else 0, fields, _text(cls)), _made_by(made_class, own))
         setattr(cls, _ATTRIBUTE, made)
         return cls
 
     return decorate if cls is None else decorate(cls)
 
 
+def _made_by(cls: Any, own: dict[str, str]) -> Any:
+    """What makes values of a struct: its class; where that has other names than others know, they are put in place."""
+    renamed = {known: name for known, name in own.items() if known != name}
+    if not renamed:
+        return cls
+    cls.__rohrpost_names__ = {name: known for known, name in renamed.items()}
+    for known, name in renamed.items():
+        setattr(cls, known, property(operator.attrgetter(name)))
+    return lambda **members: cls(**{own[known]: value for known, value in members.items()})
+
+
 def _variant(cls: type, name: str, annotation: Any) -> Named:
-    field = field_of("", annotation, f"{cls.__name__}.{name}")
-    return Named(name) if field.type == tree.UNIT else Named(name, 1, (field,))
+    where = f"{cls.__name__}.{name}"
+    if annotation in (None, type(None)):
+        return Named(name)
+    if typing.get_origin(annotation) is Annotated and typing.get_args(annotation)[1:] == (inline,):
+        base = typing.get_args(annotation)[0]
+        members = base.__dict__.get(_ATTRIBUTE) if isinstance(base, type) else None
+        if isinstance(members, tree.Struct) and members.named.kind == 3:
+            return Named(name, 3, members.named.fields)
+        return Named(name, 2, _elements(base, where))
+    return Named(name, 1, (field_of("", annotation, where),))
+
+
+def _elements(annotation: Any, where: str) -> tuple[Field, ...]:
+    """Fields without names of a tuple's elements."""
+    arguments = typing.get_args(annotation)
+    if typing.get_origin(annotation) is not tuple or Ellipsis in arguments:
+        raise Misuse(f"{where}: `inline` is for a tuple or a class with fields")
+    return tuple(field_of("", argument, where) for argument in arguments)
 
 
 def _text(cls: type) -> str:
@@ -178,26 +233,31 @@ def hints_of(function: Any) -> dict[str, Any]:
 
 def field_of(name: str, annotation: Any, where: str) -> Field:
     """A field of this annotation, with what :class:`said` says of it."""
-    made = type_of(annotation, f"{where}.{name}" if name else where)
-    extras = typing.get_args(annotation)[1:] if typing.get_origin(annotation) is Annotated else ()
-    words = next((extra for extra in extras if isinstance(extra, said)), said())
-    least, most = (bound_of(made, bound, where, name) for bound in (words.min, words.max))
-    return Field(name, made, words.text, words.unit, least, most)
+    place = f"{where}.{name}" if name else where
+    if typing.get_origin(annotation) is not Annotated:
+        return Field(name, type_of(annotation, place))
+    return _said_of(name, _annotated(typing.get_args(annotation), place), place)
 
 
-def bound_of(type: Type, bound: Any, where: str, name: str) -> bytes | None:
+def _said_of(name: str, made: tuple[Type, said], where: str) -> Field:
+    type, words = made
+    least, most = (bound_of(type, bound, where) for bound in (words.min, words.max))
+    return Field(words.name or name, type, words.text, words.unit, least, most)
+
+
+def bound_of(type: Type, bound: Any, where: str) -> bytes | None:
     """Postcard of the end of a range."""
     try:
         return None if bound is None else encode(type, bound)
     except WalkError as error:
-        raise Misuse(f"{where}.{name}: its range: {error}") from None
+        raise Misuse(f"{where}: its range: {error}") from None
 
 
 def type_of(annotation: Any, where: str = "the annotation") -> Type:
     """The type of an annotation. Raises :class:`Misuse` with ``where``, if it has none."""
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Annotated:
-        return _annotated(arguments, where)
+        return _annotated(arguments, where)[0]
     if annotation in _PLAIN if isinstance(annotation, (type, types.NoneType)) else False:
         return _PLAIN[annotation]
     if isinstance(annotation, type) and _ATTRIBUTE in annotation.__dict__:
@@ -218,13 +278,23 @@ def type_of(annotation: Any, where: str = "the annotation") -> Type:
     )
 
 
-def _annotated(arguments: tuple[Any, ...], where: str) -> Type:
+def _annotated(arguments: tuple[Any, ...], where: str) -> tuple[Type, said]:
+    """From the inside out: what stands behind a type is of all before it."""
     base, extras = arguments[0], arguments[1:]
-    plain = next((extra for extra in extras if isinstance(extra, tree.Plain)), None)
-    made = plain if plain is not None else type_of(base, where)
-    length = next((extra for extra in extras if isinstance(extra, Length)), None)
-    if length is None:
-        return made
-    if not isinstance(made, tree.List):
-        raise Misuse(f"{where}: `Length` is for a list")
-    return tree.Array(length.elements, made.element)
+    made, words = type_of(base, where), said()
+    for at, extra in enumerate(extras):
+        if isinstance(extra, tree.Plain):
+            made = extra
+        elif isinstance(extra, said):
+            words = extra
+        elif isinstance(extra, wrapped):
+            several = inline in extras[at + 1 : at + 2]
+            fields = _elements(base, where) if several else (_said_of("", (made, words), where),)
+            made, words = tree.Struct(Named(extra.name, 2 if several else 1, fields, extra.text)), said()
+        elif isinstance(extra, Length):
+            if not isinstance(made, tree.List):
+                raise Misuse(f"{where}: `Length` is for a list")
+            made = tree.Array(extra.elements, made.element)
+        elif extra is maybe:
+            made = tree.Option(made)
+    return made, words

@@ -4,141 +4,23 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, ContextManager, Protocol, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, ContextManager, Protocol
 
 from .annotations import bound_of, field_of, first_paragraph, hints_of, said, type_of
 from .common import result_of
 from .errors import Misuse
 from .hosts import NodeHost
+from .marks import MARK, Command, DataOut, Every, OnData, OnRecord, StreamOut
 from .schema import tree
 from .schema.description import DataItem, Description, Function
 from .schema.encode import encode
 from .schema.errors import WalkError
 from .schema.text import show
 from .schema.tree import Field, Type
-from .wire import COMMAND_MAX, DATA_MAX, FIRST_OWN
 
 if TYPE_CHECKING:
     from .node.streams import StreamReader
-
-F = TypeVar("F", bound=Callable[..., Any])
-_MARK = "__rohrpost__"
-RECORD_BYTES_MAX = 64 << 20
-"""Larger records are not taken, unless a program says so."""
-
-
-@dataclass(frozen=True)
-class Command:
-    """What :func:`command` says."""
-
-    number: int
-    idempotent: bool
-    error: Any
-
-
-@dataclass(frozen=True)
-class DataOut:
-    """What :func:`data_out` says. ``rate_hz``: how often it is asked for and published; none: by ``publish`` alone."""
-
-    number: int
-    rate_hz: float | None
-    unit: str
-
-
-@dataclass(frozen=True)
-class OnData:
-    """What :func:`on_data` says. ``period_s``: none: each value; else the newest once in so many seconds."""
-
-    publisher: str
-    data: str
-    period_s: float
-    newest: bool
-
-
-@dataclass(frozen=True)
-class OnRecord:
-    """What :func:`on_record` says."""
-
-    publisher: str
-    stream: str
-    most_bytes: int
-
-
-@dataclass(frozen=True)
-class StreamOut:
-    """What :func:`stream` says."""
-
-    number: int
-    unit: str
-
-
-@dataclass(frozen=True)
-class Every:
-    """What :func:`every` says."""
-
-    period_s: float
-
-
-def command(number: int, *, idempotent: bool = False, error: Any = None) -> Callable[[F], F]:
-    """A function that others call, by its number, 16 and above.
-
-    ``idempotent``: running it twice does no harm. ``error``: the type of its own errors, which it returns by raising
-    :class:`rohrpost.FunctionError`.
-    """
-    if not FIRST_OWN <= number <= COMMAND_MAX:
-        raise Misuse(f"command {number}: numbers of own commands are {FIRST_OWN} to {COMMAND_MAX}")
-    return _marked(Command(number, idempotent, error))
-
-
-def data_out(number: int, *, rate_hz: float | None = None, unit: str = "") -> Callable[[F], F]:
-    """Data that others ask for and subscribe to. With ``rate_hz`` the function is run so often while the module is on,
-    and what it returns is published; else ``self.publish`` does."""
-    if not 0 <= number <= DATA_MAX:
-        raise Misuse(f"data {number}: numbers of data are 0 to {DATA_MAX}")
-    if rate_hz is not None and not 0 < rate_hz <= 10_000:
-        raise Misuse(f"data {number}: `rate_hz` is above 0 and at most 10000, not {rate_hz}")
-    return _marked(DataOut(number, rate_hz, unit))
-
-
-def stream(number: int, *, unit: str = "") -> Callable[[F], F]:
-    """A stream that others read, by its name and the type that the function returns; it is never run. ``self.write``
-    and ``self.begin`` write its records. For modules on the node alone."""
-    if not 0 <= number <= DATA_MAX:
-        raise Misuse(f"stream {number}: numbers of streams are 0 to {DATA_MAX}")
-    return _marked(StreamOut(number, unit))
-
-
-def every(period_s: float) -> Callable[[F], F]:
-    """A function without arguments that is run once in so many seconds while the module is on."""
-    if not 0.0001 <= period_s <= 86_400:
-        raise Misuse(f"a period of {period_s} s: it is 0.0001 to 86400")
-    return _marked(Every(period_s))
-
-
-def on_data(publisher: str, data: str, *, period_s: float = 0.0, newest: bool = False) -> Callable[[F], F]:
-    """A function that is run with each value of another module's data, such as ``"odometry.0", "odometry"``.
-
-    ``period_s``: the newest value once in so many seconds. ``newest``: of values that wait only the newest counts. If
-    the function's argument has an annotation, the data must be of that type.
-    """
-    return _marked(OnData(publisher, data, period_s, newest))
-
-
-def on_record(publisher: str, stream: str, *, most_bytes: int = RECORD_BYTES_MAX) -> Callable[[F], F]:
-    """A function that is run with the records of another module's stream, such as ``"camera.0", "image"``: with the
-    newest, whenever its turn comes. Records of more than ``most_bytes`` are not taken. If the function's argument has
-    an annotation, the records must be of that type."""
-    return _marked(OnRecord(publisher, stream, most_bytes))
-
-
-def _marked(mark: Command | DataOut | OnData | OnRecord | StreamOut | Every) -> Callable[[F], F]:
-    def decorate(function: F) -> F:
-        setattr(function, _MARK, mark)
-        return function
-
-    return decorate
-
 
 class Parameter:
     """A value that tools read and set, see :func:`parameter`."""
@@ -159,7 +41,7 @@ class Parameter:
                 f"{owner}.{self.name}: a parameter needs its type, such as `{self.name}: float = parameter(…)`"
             )
         type = type_of(annotation, f"{owner}.{self.name}")
-        least, most = (bound_of(type, it, owner, self.name) for it in (self._words.min, self._words.max))
+        least, most = (bound_of(type, it, f"{owner}.{self.name}") for it in (self._words.min, self._words.max))
         self.field = Field(self.name.replace("_", "-"), type, self._words.text, self._words.unit, least, most)
         self.check(self.default, owner)
 
@@ -249,7 +131,8 @@ class Module:
 
     ``klass``: the class in the configuration. ``interface``: name of the interface, if not that of the class.
     ``settings``: names of settings besides its parameters, for the node (:attr:`settings`). Its functions run one after
-    the other, so they need no locks among themselves.
+    the other, so they need no locks among themselves. A class below another has its interface, and gives functions that
+    it has bodies of its own; what stands at them in the base holds.
     """
 
     interface_: ClassVar[Interface]
@@ -262,6 +145,7 @@ class Module:
         base: Interface | None = getattr(cls, "interface_", None)
         if klass is None and base is not None:
             klass = base.description.klass
+            interface = interface or base.description.name
         if klass is None:
             raise Misuse(f'{cls.__name__}: of which class is it? write `class {cls.__name__}(Module, klass="…")`')
         cls.interface_ = _interface(cls, klass, interface or cls.__name__)
@@ -338,26 +222,43 @@ class Module:
         return self._host
 
 
+def _marks(cls: type) -> list[tuple[str, Any, Any]]:
+    """Names of marked functions, what stands at each, and the function at which it stands: of a base, where the class
+    gives it another body."""
+    found = {}
+    for base in reversed(cls.__mro__):
+        for key, value in vars(base).items():
+            if hasattr(value, MARK):
+                found[key] = (key, getattr(value, MARK), value)
+            elif key in found and not callable(value):
+                del found[key]
+    return sorted(found.values(), key=lambda it: it[0])
+
+
 def _interface(cls: type, klass: str, name: str) -> Interface:
-    marked = [(key, getattr(value, _MARK)) for key, value in inspect.getmembers(cls) if hasattr(value, _MARK)]
+    all_marked = _marks(cls)
+    declared = {key: function for key, _, function in all_marked}
+    marked = [(key, mark) for key, mark, _ in all_marked]
     commands = [(key, mark) for key, mark in marked if isinstance(mark, Command)]
-    outputs = [(key, mark) for key, mark in marked if isinstance(mark, DataOut)]
-    streams = [(key, mark) for key, mark in marked if isinstance(mark, StreamOut)]
-    functions = tuple(_function(cls, key, mark) for key, mark in sorted(commands, key=lambda it: it[1].number))
-    given: list[tuple[str, DataOut | StreamOut]] = [*outputs, *streams]
+    commands.sort(key=lambda it: it[1].number)
+    given = [(key, mark) for key, mark in marked if isinstance(mark, (DataOut, StreamOut))]
     given.sort(key=lambda it: it[1].number)
-    data = tuple(_data(cls, key, mark) for key, mark in given)
+    functions = tuple(_function(cls, key, mark, declared[key]) for key, mark in commands)
+    data = tuple(_data(cls, key, mark, declared[key]) for key, mark in given)
     for what, numbers in (("command", [it.number for it in functions]), ("data", [it.number for it in data])):
         twice = {number for number in numbers if numbers.count(number) > 1}
         if twice:
             raise Misuse(f"{cls.__name__}: {what} {min(twice)} is there twice")
     made = Interface(Description(name, klass, functions, data, first_paragraph(cls.__doc__)))
     made.commands = {mark.number: Handler(key, mark) for key, mark in commands}
-    made.outputs = {mark.number: Handler(key, mark) for key, mark in outputs}
-    made.inputs = [Handler(key, mark, _input(cls, key)) for key, mark in marked if isinstance(mark, OnData)]
-    made.streams = {mark.number: Handler(key, mark) for key, mark in streams}
-    made.timed = [Handler(key, mark) for key, mark in marked if isinstance(mark, Every) and not _arguments(cls, key)[0]]
-    made.records = [Handler(key, mark, _input(cls, key)) for key, mark in marked if isinstance(mark, OnRecord)]
+    made.outputs = {mark.number: Handler(key, mark) for key, mark in given if isinstance(mark, DataOut)}
+    made.streams = {mark.number: Handler(key, mark) for key, mark in given if isinstance(mark, StreamOut)}
+    followed = [(key, mark) for key, mark in marked if isinstance(mark, (OnData, OnRecord))]
+    inputs = [Handler(key, mark, _input(cls, key, declared[key])) for key, mark in followed]
+    made.inputs = [it for it in inputs if isinstance(it.mark, OnData)]
+    made.records = [it for it in inputs if isinstance(it.mark, OnRecord)]
+    timed = [(key, mark) for key, mark in marked if isinstance(mark, Every)]
+    made.timed = [Handler(key, mark) for key, mark in timed if not _arguments(cls, key, declared[key])[0]]
     hints = hints_of(cls) if any(isinstance(it, Parameter) for it in vars(cls).values()) else {}
     for base in reversed(cls.__mro__):
         for value in vars(base).values():
@@ -368,8 +269,7 @@ def _interface(cls: type, klass: str, name: str) -> Interface:
     return made
 
 
-def _arguments(cls: type, name: str) -> tuple[list[str], dict[str, Any]]:
-    function = getattr(cls, name)
+def _arguments(cls: type, name: str, function: Any) -> tuple[list[str], dict[str, Any]]:
     arguments = list(inspect.signature(function).parameters.values())[1:]
     for argument in arguments:
         if argument.kind not in (argument.POSITIONAL_ONLY, argument.POSITIONAL_OR_KEYWORD):
@@ -377,8 +277,8 @@ def _arguments(cls: type, name: str) -> tuple[list[str], dict[str, Any]]:
     return [argument.name for argument in arguments], hints_of(function)
 
 
-def _function(cls: type, name: str, mark: Command) -> Function:
-    arguments, hints = _arguments(cls, name)
+def _function(cls: type, name: str, mark: Command, function: Any) -> Function:
+    arguments, hints = _arguments(cls, name, function)
     where = f"{cls.__name__}.{name}"
     for argument in (*arguments, "return"):
         if argument not in hints:
@@ -387,22 +287,22 @@ def _function(cls: type, name: str, mark: Command) -> Function:
     result = type_of(hints["return"], where)
     if mark.error is not None:
         result = result_of(result, type_of(mark.error, where))
-    text = first_paragraph(getattr(cls, name).__doc__)
-    return Function(mark.number, name, fields, result, text, mark.idempotent)
+    text = first_paragraph(function.__doc__)
+    return Function(mark.number, mark.name or name, fields, result, text, mark.idempotent)
 
 
-def _data(cls: type, name: str, mark: DataOut | StreamOut) -> DataItem:
-    arguments, hints = _arguments(cls, name)
+def _data(cls: type, name: str, mark: DataOut | StreamOut, function: Any) -> DataItem:
+    arguments, hints = _arguments(cls, name, function)
     where = f"{cls.__name__}.{name}"
     if arguments or "return" not in hints:
         raise Misuse(f"{where}: data take no arguments, and need the annotation of what they return")
-    text = first_paragraph(getattr(cls, name).__doc__)
-    field = Field(name, type_of(hints["return"], where), text, mark.unit)
-    return DataItem(mark.number, field, isinstance(mark, StreamOut))
+    field = field_of(mark.name or name, hints["return"], where)
+    text = field.text or first_paragraph(function.__doc__)
+    return DataItem(mark.number, replace(field, text=text, unit=mark.unit or field.unit), isinstance(mark, StreamOut))
 
 
-def _input(cls: type, name: str) -> Type | None:
-    arguments, hints = _arguments(cls, name)
+def _input(cls: type, name: str, function: Any) -> Type | None:
+    arguments, hints = _arguments(cls, name, function)
     if len(arguments) != 1:
         raise Misuse(f"{cls.__name__}.{name}: it takes one argument, the value")
     annotation = hints.get(arguments[0])

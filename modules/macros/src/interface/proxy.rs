@@ -23,7 +23,7 @@ pub(super) fn proxy(item: &ItemTrait, krate: &TokenStream, commands: &[Command],
     let doc = format!("Calls the functions of [`{name}`] in another module.");
     let calls = commands.iter().map(|command| {
         let Command { number: Number { number, .. }, name, text, names, types, result, .. } = command;
-        let begin = format_ident!("begin_{name}");
+        let begin = format_ident!("begin_{}", super::plain_name(name));
         let begin_text = format!("Begins [`Self::{name}`] and returns at once; wait for its result later.");
         let (returns, wait) = match result_of(result) {
             Some((value, error)) => {
@@ -47,7 +47,7 @@ pub(super) fn proxy(item: &ItemTrait, krate: &TokenStream, commands: &[Command],
         }
     });
     let gets = data.iter().map(|Data { kind, name, ty, .. }| {
-        let constant = Ident::new(&name.to_string().to_uppercase(), name.span());
+        let constant = Ident::new(&super::plain_name(name).to_uppercase(), name.span());
         let newest = (*kind == DataKind::Stream).then(|| quote!(.data()));
         let text = format!("Asks for the newest `{name}`: its system time (ns since 1970) and itself.");
         quote! {

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from .. import _node
 from ..errors import FunctionError, Misuse
 from ..hosts import NodeHost
-from ..interface import Handler, Module, OnRecord, Parameter
+from ..interface import Handler, Module, Parameter
+from ..marks import DataOut, OnRecord
 from ..schema import tree
 from ..schema.binary import field_from_bytes, field_to_bytes, type_to_bytes
 from ..schema.decode import decode
@@ -108,8 +109,9 @@ class Bridge(NodeHost):
         now_ns, _, epoch = _node.now()
         for handler in self._timed.due(now_ns, epoch):
             value = getattr(module, handler.name)()
-            if handler.name in self._items:
-                self.publish(module, handler.name, value, now_ns)
+            mark = handler.mark
+            if isinstance(mark, DataOut):
+                self.publish(module, mark.name or handler.name, value, now_ns)
 
     @_told
     def received(

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ..interface import DataOut, Handler
+from ..interface import Handler
+from ..marks import DataOut
 
 
 @dataclass

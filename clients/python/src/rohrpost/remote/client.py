@@ -17,7 +17,8 @@ from typing import Any
 
 from ..common import Status
 from ..errors import CallError, Misuse, NoConnection
-from ..interface import RECORD_BYTES_MAX, Module
+from ..interface import Module
+from ..marks import RECORD_BYTES_MAX
 from ..names import Name
 from ..schema.description import Description
 from ..schema.tree import UNIT

@@ -12,7 +12,8 @@ from ..common import (
 )  # fmt: skip
 from ..errors import FunctionError, Misuse, NotSent
 from ..faults import Fault
-from ..interface import DataOut, Handler, Module
+from ..interface import Handler, Module
+from ..marks import DataOut
 from ..names import Name
 from ..schema import tree
 from ..schema.binary import varint
@@ -372,9 +373,9 @@ class Hosted:
         def finish(now_ns: int, value: Any, error: BaseException | None) -> None:
             tick.is_queued = False
             try:
-                is_data = isinstance(tick.handler.mark, DataOut)
-                if error is None and self.state is State.On and is_data:
-                    self.publish(now_ns, tick.handler.name, value, stamp_ns)
+                mark = tick.handler.mark
+                if error is None and self.state is State.On and isinstance(mark, DataOut):
+                    self.publish(now_ns, mark.name or tick.handler.name, value, stamp_ns)
             except Misuse as wrong:
                 error = wrong
             self._noticed(error)

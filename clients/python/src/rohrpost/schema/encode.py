@@ -153,9 +153,9 @@ class _Encoder:
                 word = parse_argument(type.key, key) if isinstance(key, str) else key
                 self.member(type.key, word, name)
                 self.member(type.value, inner, name)
-        elif isinstance(value, (list, tuple)):
+        elif isinstance(value, (list, tuple, dict)):
             self.out += varint(len(value))
-            for index, pair in enumerate(value):
+            for index, pair in enumerate(value.items() if isinstance(value, dict) else value):
                 if not isinstance(pair, (list, tuple)) or len(pair) != 2:
                     raise _mismatch(type, pair).within(f"[{index}]")
                 self.element(Tuple((type.key, type.value)), pair, index)
@@ -165,7 +165,8 @@ class _Encoder:
     def members(self, type: Type, named: Named, value: Any) -> None:
         """What a struct or variant has in it."""
         if dataclasses.is_dataclass(value) and not isinstance(value, (type_of_class, Variant)):
-            value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+            known = getattr(value, "__rohrpost_names__", {})
+            value = {known.get(it.name, it.name): getattr(value, it.name) for it in dataclasses.fields(value)}
         if named.kind == 0 and value in (None, {}):
             return
         if named.kind == 1:

@@ -1,0 +1,312 @@
+//! An interface as a file: what `call --json` prints of it, with the file's format and the interface's hash.
+//!
+//! Reading is strict. What is not known is refused with its place, as a file that is only half understood would make
+//! code of another interface; and the hash must be that of what was read.
+
+use rohrpost::output::plain;
+use rohrpost::schema::{
+    DataItem, DataKind, Description, Field, Function, Members, Named, SchemaError, Type, Value, WalkError, encode,
+};
+use serde::Serialize;
+use serde_json::{Map, Value as Json};
+use std::io::Read;
+use std::path::Path;
+
+/// Raised when older programs would misunderstand a file.
+const FORMAT: u64 = 1;
+/// A description has at most 1 MiB; as JSON it is longer.
+const BYTES_MAX: u64 = 8 << 20;
+
+/// Why a file is no interface.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum FileError {
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+    #[error("more than {} MiB; no interface is so long", BYTES_MAX >> 20)]
+    Long,
+    /// Also what nests deeper than the library reads, 128 brackets.
+    #[error("no JSON of an interface: {0}")]
+    Json(#[from] serde_json::Error),
+    #[error("{}: {problem}", plain::line(.place))]
+    Place { place: String, problem: PlaceProblem },
+    #[error("the file says hash {said}, and what it describes has {is:#010x}; export it again, change no file by hand")]
+    Hash { said: String, is: u32 },
+    #[error("no interface: {0}")]
+    Schema(#[from] SchemaError),
+    #[error("this interface nests deeper than a file can: {0}")]
+    Deep(serde_json::Error),
+}
+
+/// What is wrong at a place.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum PlaceProblem {
+    #[error("expected {expected}, got `{}`", plain::line(.got))]
+    Expected { expected: &'static str, got: String },
+    #[error("not given; expected {0}")]
+    Missing(&'static str),
+    #[error("nothing of this name belongs here")]
+    Unknown,
+    #[error("format {0}, this program reads {FORMAT}; use programs of the same version of Rohrpost")]
+    Format(u64),
+    #[error("{0}")]
+    Bound(WalkError),
+}
+
+#[derive(Serialize)]
+struct InterfaceFile<'a> {
+    format: u64,
+    hash: String,
+    #[serde(flatten)]
+    description: &'a Description,
+}
+
+/// The file of an interface.
+pub(super) fn write(description: &Description) -> Result<String, FileError> {
+    let hash = format!("{:#010x}", description.hash());
+    let text = serde_json::to_string_pretty(&InterfaceFile { format: FORMAT, hash, description })?;
+    // What cannot be read back is written for nobody.
+    match read(&text) {
+        Err(FileError::Json(error)) => Err(FileError::Deep(error)),
+        read => read.map(|_| text),
+    }
+}
+
+pub(super) fn load(file: &Path) -> Result<Description, FileError> {
+    let mut text = String::new();
+    std::fs::File::open(file)?.take(BYTES_MAX + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > BYTES_MAX {
+        return Err(FileError::Long);
+    }
+    read(&text)
+}
+
+/// Reads what [`write`] wrote.
+pub(super) fn read(text: &str) -> Result<Description, FileError> {
+    let json: Json = serde_json::from_str(text)?;
+    let file = FilePlace { path: String::new(), json: &json };
+    let keys = ["format", "hash", "name", "class", "text", "functions", "data"];
+    let top = file.object(&keys)?;
+    let format = top.need("format", "the number of the format")?;
+    match format.json.as_u64() {
+        Some(FORMAT) => {}
+        Some(other) => return Err(format.wrong(PlaceProblem::Format(other))),
+        None => return Err(format.expected("the number of the format")),
+    }
+    let said = top.need("hash", "the hash")?.text()?;
+    let description = Description {
+        name: top.need("name", "a name")?.text()?,
+        class: top.need("class", "a class")?.text()?,
+        text: top.text_or_none("text")?,
+        functions: top.need("functions", "a list of functions")?.each(|place| place.function())?,
+        data: top.need("data", "a list of data")?.each(|place| place.data_item())?,
+    };
+    // The bounds of all descriptions: how many types, and how deep.
+    let description = Description::from_bytes(&description.to_bytes())?;
+    let is = description.hash();
+    let number = said.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok());
+    if number != Some(is) {
+        return Err(FileError::Hash { said: plain::line(&said).into_owned(), is });
+    }
+    Ok(description)
+}
+
+/// A value in the file, and the way to it.
+struct FilePlace<'a> {
+    path: String,
+    json: &'a Json,
+}
+
+/// An object in the file, of which all keys are known.
+struct Object<'a> {
+    path: String,
+    entries: &'a Map<String, Json>,
+}
+
+impl<'a> Object<'a> {
+    fn get(&self, key: &str) -> Option<FilePlace<'a>> {
+        self.entries.get(key).map(|json| FilePlace { path: below(&self.path, key), json })
+    }
+
+    fn need(&self, key: &str, expected: &'static str) -> Result<FilePlace<'a>, FileError> {
+        let missing = || FileError::Place { place: below(&self.path, key), problem: PlaceProblem::Missing(expected) };
+        self.get(key).ok_or_else(missing)
+    }
+
+    fn text_or_none(&self, key: &str) -> Result<String, FileError> {
+        self.get(key).map_or(Ok(String::new()), |place| place.text())
+    }
+}
+
+fn below(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}
+
+impl<'a> FilePlace<'a> {
+    fn wrong(&self, problem: PlaceProblem) -> FileError {
+        let place = if self.path.is_empty() { "the whole".into() } else { self.path.clone() };
+        FileError::Place { place, problem }
+    }
+
+    fn expected(&self, expected: &'static str) -> FileError {
+        let mut got = self.json.to_string();
+        if let Some((end, _)) = got.char_indices().nth(40) {
+            got.truncate(end);
+            got.push('…');
+        }
+        self.wrong(PlaceProblem::Expected { expected, got })
+    }
+
+    fn object(&self, keys: &[&str]) -> Result<Object<'a>, FileError> {
+        let entries = self.json.as_object().ok_or_else(|| self.expected("an object"))?;
+        match entries.iter().find(|(key, _)| !keys.contains(&key.as_str())) {
+            Some((key, json)) => Err(FilePlace { path: below(&self.path, key), json }.wrong(PlaceProblem::Unknown)),
+            None => Ok(Object { path: self.path.clone(), entries }),
+        }
+    }
+
+    fn text(&self) -> Result<String, FileError> {
+        self.json.as_str().map(str::to_owned).ok_or_else(|| self.expected("a text"))
+    }
+
+    fn number(&self) -> Result<u16, FileError> {
+        let number = self.json.as_u64().and_then(|number| u16::try_from(number).ok());
+        number.ok_or_else(|| self.expected("a number from 0 to 65535"))
+    }
+
+    fn list(&self) -> Result<Vec<FilePlace<'a>>, FileError> {
+        let all = self.json.as_array().ok_or_else(|| self.expected("a list"))?;
+        Ok(all.iter().enumerate().map(|(at, json)| FilePlace { path: format!("{}[{at}]", self.path), json }).collect())
+    }
+
+    fn each<T>(&self, read: impl Fn(&Self) -> Result<T, FileError>) -> Result<Vec<T>, FileError> {
+        self.list()?.iter().map(read).collect()
+    }
+
+    fn function(&self) -> Result<Function, FileError> {
+        let object = self.object(&["number", "name", "text", "idempotent", "arguments", "result"])?;
+        let idempotent = object.need("idempotent", "true or false")?;
+        Ok(Function {
+            number: object.need("number", "a number")?.number()?,
+            name: object.need("name", "a name")?.text()?,
+            text: object.text_or_none("text")?,
+            idempotent: idempotent.json.as_bool().ok_or_else(|| idempotent.expected("true or false"))?,
+            arguments: object.need("arguments", "a list of arguments")?.each(|place| place.field())?,
+            result: object.need("result", "a type")?.ty()?,
+        })
+    }
+
+    fn data_item(&self) -> Result<DataItem, FileError> {
+        let object = self.object(&["number", "kind", "name", "text", "unit", "type", "min", "max"])?;
+        let kind = object.need("kind", "`data` or `stream`")?;
+        Ok(DataItem {
+            number: object.need("number", "a number")?.number()?,
+            kind: match kind.json.as_str() {
+                Some("data") => DataKind::Data,
+                Some("stream") => DataKind::Stream,
+                _ => return Err(kind.expected("`data` or `stream`")),
+            },
+            field: field_of(&object)?,
+        })
+    }
+
+    fn field(&self) -> Result<Field, FileError> {
+        field_of(&self.object(&["name", "text", "unit", "type", "min", "max"])?)
+    }
+
+    fn ty(&self) -> Result<Type, FileError> {
+        const TYPE: &str = "a type, such as `f64` or {\"list\": \"f64\"}";
+        if let Some(word) = self.json.as_str() {
+            return plain_type(word).ok_or_else(|| self.expected(TYPE));
+        }
+        let (tag, json) = match self.json.as_object().map(|entries| (entries.len(), entries.iter().next())) {
+            Some((1, Some(only))) => only,
+            _ => return Err(self.expected(TYPE)),
+        };
+        let inner = FilePlace { path: below(&self.path, tag), json };
+        let pair = || match &inner.list()?[..] {
+            [first, second] => Ok((
+                FilePlace { path: first.path.clone(), ..*first },
+                FilePlace { path: second.path.clone(), ..*second },
+            )),
+            _ => Err(inner.expected("a list of two")),
+        };
+        Ok(match tag.as_str() {
+            "option" => Type::option(inner.ty()?),
+            "list" => Type::list(inner.ty()?),
+            "array" => {
+                let (length, element) = pair()?;
+                let number = length.json.as_u64().and_then(|number| u32::try_from(number).ok());
+                let number = number.ok_or_else(|| length.expected("a number of elements"))?;
+                Type::Array(number, Box::new(element.ty()?))
+            }
+            "map" => {
+                let (key, value) = pair()?;
+                Type::Map(Box::new(key.ty()?), Box::new(value.ty()?))
+            }
+            "tuple" => Type::Tuple(inner.each(|place| place.ty())?),
+            "struct" => Type::Struct(inner.named()?),
+            "enum" => {
+                let object = inner.object(&["name", "text", "variants"])?;
+                Type::Enum {
+                    name: object.need("name", "a name")?.text()?,
+                    text: object.text_or_none("text")?,
+                    variants: object.need("variants", "a list of variants")?.each(|place| place.named())?,
+                }
+            }
+            _ => return Err(self.expected(TYPE)),
+        })
+    }
+
+    fn named(&self) -> Result<Named, FileError> {
+        const MEMBERS: &str = "`none`, or an object with `one`, `tuple` or `fields`";
+        let object = self.object(&["name", "text", "members"])?;
+        let members = object.need("members", MEMBERS)?;
+        let entry = members.json.as_object().filter(|entries| entries.len() == 1).and_then(|it| it.iter().next());
+        let inner = entry.map(|(tag, json)| (tag.as_str(), FilePlace { path: below(&members.path, tag), json }));
+        let members = match inner {
+            None if *members.json == "none" => Members::None,
+            Some(("one", field)) => Members::One(Box::new(field.field()?)),
+            Some(("tuple", fields)) => Members::Tuple(fields.each(|place| place.field())?),
+            Some(("fields", fields)) => Members::Fields(fields.each(|place| place.field())?),
+            _ => return Err(members.expected(MEMBERS)),
+        };
+        let text = object.text_or_none("text")?;
+        Ok(Named::new(object.need("name", "a name")?.text()?, members).said(text))
+    }
+}
+
+fn field_of(object: &Object<'_>) -> Result<Field, FileError> {
+    let ty = object.need("type", "a type")?.ty()?;
+    let bound = |key| {
+        let Some(place) = object.get(key) else { return Ok(None) };
+        let value: Value = serde_json::from_value(place.json.clone())?;
+        encode(&ty, &value).map(Some).map_err(|error| place.wrong(PlaceProblem::Bound(error)))
+    };
+    let (least, most) = (bound("min")?, bound("max")?);
+    let field = Field::new(object.text_or_none("name")?, ty);
+    Ok(field.said(object.text_or_none("text")?, object.text_or_none("unit")?).bounded(least, most))
+}
+
+/// Types that are one word.
+fn plain_type(word: &str) -> Option<Type> {
+    Some(match word {
+        "unit" => Type::Unit,
+        "bool" => Type::Bool,
+        "u8" => Type::U8,
+        "u16" => Type::U16,
+        "u32" => Type::U32,
+        "u64" => Type::U64,
+        "u128" => Type::U128,
+        "i8" => Type::I8,
+        "i16" => Type::I16,
+        "i32" => Type::I32,
+        "i64" => Type::I64,
+        "i128" => Type::I128,
+        "f32" => Type::F32,
+        "f64" => Type::F64,
+        "char" => Type::Char,
+        "text" => Type::Text,
+        "bytes" => Type::Bytes,
+        _ => return None,
+    })
+}
