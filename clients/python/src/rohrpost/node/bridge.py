@@ -57,6 +57,7 @@ class Bridge(NodeHost):
         self._class = module
         self._interface = module.interface_
         self._items = {item.name: item for item in self._interface.description.data}
+        self._numbered = {item.number: item for item in self._items.values()}
         self._functions = {function.number: function for function in self._interface.description.functions}
         self._module: Module | None = None
         self._settings: dict[str, Any] = {}
@@ -109,9 +110,9 @@ class Bridge(NodeHost):
         now_ns, _, epoch = _node.now()
         for handler in self._timed.due(now_ns, epoch):
             value = getattr(module, handler.name)()
-            mark = handler.mark
-            if isinstance(mark, DataOut):
-                self.publish(module, mark.name or handler.name, value, now_ns)
+            if isinstance(handler.mark, DataOut):
+                item = self._numbered[handler.mark.number]
+                _node.publish(item.number, now_ns, self._encoded(item, value))
 
     @_told
     def received(
