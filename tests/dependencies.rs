@@ -31,7 +31,7 @@ const DOUBLED: [(&str, &str); 6] = [
 ];
 
 /// Our tools, or crates that only tools need.
-const NOT_FOR_MODULES: [&str; 13] = [
+const NOT_FOR_MODULES: [&str; 14] = [
     "clap",
     "comfy-table",
     "flate2",
