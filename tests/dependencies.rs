@@ -31,11 +31,12 @@ const DOUBLED: [(&str, &str); 6] = [
 ];
 
 /// Our tools, or crates that only tools need.
-const NOT_FOR_MODULES: [&str; 13] = [
+const NOT_FOR_MODULES: [&str; 14] = [
     "clap",
     "comfy-table",
     "flate2",
     "mcap",
+    "pyo3",
     "rand",
     "ratatui",
     "rcgen",
@@ -46,8 +47,8 @@ const NOT_FOR_MODULES: [&str; 13] = [
     "rustls",
     "serde_json",
 ];
-/// Peers that only benches need, and the GUI bridge's own dependencies.
-const NOT_FOR_THE_COMMAND: [&str; 3] = ["iceoryx2", "rerun", "zenoh"];
+/// Peers that only benches need, and the own dependencies of the GUI bridge and of the package in Python.
+const NOT_FOR_THE_COMMAND: [&str; 4] = ["iceoryx2", "pyo3", "rerun", "zenoh"];
 
 struct Crate {
     name: String,

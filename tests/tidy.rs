@@ -63,11 +63,6 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "what a clock remembers in time slots, and does there",
     ),
     ("tests/testbed/src/sim/plan/draw.rs", "tests/testbed/src/sim/plan/mod.rs", "a plan, and how its parts are drawn"),
-    (
-        "modules/src/runtime/runner.rs",
-        "modules/src/runtime/start.rs",
-        "from a start to what runs, and what runs begins with a start",
-    ),
     ("modules/src/survey.rs", "modules/src/survey/standing.rs", "a module at one moment, and in which state that is"),
 ];
 

@@ -53,6 +53,7 @@ mod ping_send;
 mod printed;
 mod probe;
 mod process;
+mod python_node;
 mod readme;
 mod record;
 mod recorded;

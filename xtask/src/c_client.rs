@@ -14,7 +14,8 @@ pub(crate) fn install(args: &[String]) -> Result<ExitCode, Failure> {
         return Err("cargo xtask c-client takes the folder to install into, such as /usr/local".into());
     };
     let prefix = std::path::absolute(prefix).map_err(|error| format!("{prefix}: {error}"))?;
-    let build = ["build", "--release", "--package", "rohrpost-c"];
+    // Without Rust's own kind of library, beside which nothing is optimised as a whole.
+    let build = ["rustc", "--release", "--package", "rohrpost-c", "--lib", "--crate-type", "cdylib,staticlib"];
     cargo::run("building the library for C", &mut cargo::cargo(&build))?;
     let (source, built) = (cargo::root().join("clients/c"), cargo::target().join("release"));
     let [headers, libraries] = ["include", "lib"].map(|folder| prefix.join(folder));

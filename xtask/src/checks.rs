@@ -93,7 +93,7 @@ const ALL: [Stage; 8] = [
     },
     Stage { name: "drawings, with Rerun's command line", budget: 5, run: || whole(drawings()) },
     Stage { name: "recordings, with Python's reader", budget: 2, run: || whole(recordings()) },
-    Stage { name: "the client in Python, installed, with mypy", budget: 2, run: || whole(python_client()) },
+    Stage { name: "the client in Python, installed, with mypy", budget: 3, run: || whole(python_client()) },
 ];
 
 /// A stage without parts.
@@ -134,7 +134,8 @@ fn recordings() -> Result<(), Failure> {
     )
 }
 
-/// Types, strictly; then as its users have it: installed by pip. (Tests of `rohrpost-modules` run it uninstalled.)
+/// Types, strictly; then as its users have it: installed by pip, without its part in Rust and with it. (Tests of
+/// `rohrpost-modules` and of the command run it uninstalled.)
 fn python_client() -> Result<(), Failure> {
     let (python, folder) = (venv::clients()?, cargo::root().join("clients/python"));
     let run = |why: &str, arguments: &[&str]| {
@@ -143,7 +144,17 @@ fn python_client() -> Result<(), Failure> {
     let cache = cargo::target().join("mypy");
     run("checking types of the client in Python", &["-m", "mypy", "--cache-dir", &cache.to_string_lossy()])?;
     let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-build-isolation"];
-    run("installing the client in Python", &[&install[..], &["--force-reinstall", "."]].concat())?;
+    let install = [&install[..], &["--force-reinstall", "."]].concat();
+    let mut pure = Command::new(&python);
+    pure.args(&install).current_dir(&folder).env("ROHRPOST_PURE", "1");
+    cargo::run("installing the client in Python, without Rust", &mut pure)?;
+    let is_available = "import rohrpost as rp, sys; sys.exit(rp.is_available() != (sys.argv[1] == 'yes'))";
+    run("asking it for modules on the node, which it has not", &["-c", is_available, "no"])?;
+    let mut whole = Command::new(&python);
+    // By the profile of all tests, so that less is compiled.
+    whole.args(&install).current_dir(&folder).env("MATURIN_PEP517_ARGS", "--profile dev");
+    cargo::run("installing the client in Python, with its part in Rust", &mut whole)?;
+    run("asking it for modules on the node, which it has", &["-c", is_available, "yes"])?;
     run("testing the client in Python, installed", &["-m", "unittest", "discover", "-t", ".", "-s", "tests"])
 }
 

@@ -18,7 +18,8 @@ use crate::waiting::ReadyDescriptor;
 use current::entered;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Ready};
 use rohrpost_native::{
-    CommandFailure, Fault, FollowedData, ModuleError, NativeContext, NativeInterface, NativeModule, Start, exit, run,
+    CommandFailure, Fault, FollowedData, ModuleError, NativeContext, NativeInterface, NativeModule, Start, run,
+    tell_exit,
 };
 use std::ffi::{CString, c_char, c_int, c_void};
 
@@ -109,9 +110,7 @@ pub unsafe extern "C" fn rohrpost_module_run(
         };
         let started = Start::from_arguments(words.into_iter().skip(1));
         let result = started.and_then(|start| run(start, interface, |context| CModule::make(table, context)));
-        code = result.as_ref().err().map_or(0, |error| c_int::from(error.exit_code()));
-        // It says what went wrong, wherever that is to be said; of the code it makes, C has no use.
-        let _ = exit(result);
+        code = c_int::from(tell_exit(result));
         Ok(())
     });
     if ended != Code::Ok {

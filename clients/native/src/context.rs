@@ -151,8 +151,8 @@ impl NativeContext<'_> {
     }
 
     /// A module that said that its interface is another by now is asked anew.
-    pub fn forget(&mut self, peer: &Peer) {
-        self.state.peers.forget(peer);
+    pub fn forget(&mut self, module: &str) {
+        self.state.peers.forget(module);
     }
 
     /// Runs a function of another module, and waits for its result: arguments are postcard, one after the other; so is

@@ -140,7 +140,7 @@ impl Following {
             stamp_ns: data.head.stamp_ns,
             moment: data.moment(),
             sequence: data.head.sequence,
-            missed: data.head.missed.into(),
+            missed: data.head.missed,
         })
     }
 }
@@ -209,7 +209,7 @@ pub(crate) fn item_of(
 
 /// A mailbox as that for data is, but for what happens when something newer comes.
 fn open_newest(context: &mut Context) -> Result<(), NativeError> {
-    let configured = context.installation().module(context.me()).map(|module| module.mailboxes.data.clone());
+    let configured = context.installation().module(context.me()).map(|module| module.mailboxes.data);
     let mut shape = Shape { full: OverflowPolicy::Latest, ..Shape::default() };
     if let Some(spec) = configured {
         shape.slots = spec.slots;

@@ -132,6 +132,12 @@ mod tests {
             let told = parameters.accept(0, &bytes).map_err(|refusal| refusal.to_string());
             assert_eq!(told.err().as_deref(), expected, "{value}");
         }
+        let field = Field::new("any", Type::F64);
+        let any = Parameters::new(vec![NativeParameter { field, default: vec![0; 8] }]);
+        for number in [f64::NAN, f64::INFINITY] {
+            assert!(matches!(any.accept(0, &number.to_le_bytes()), Err(Refusal::Range { .. })), "{number}");
+        }
+        assert!(any.accept(0, &1e300_f64.to_le_bytes()).is_ok());
         assert!(matches!(parameters.accept(0, &[1]), Err(Refusal::Type { .. })));
         assert!(matches!(parameters.accept(1, &[1]), Err(Refusal::NoParameters)));
     }

@@ -3,15 +3,13 @@
 use crate::error::NativeError;
 use rohrpost_mailbox::Name;
 use rohrpost_modules::call::{CallError, Caller};
-use rohrpost_modules::common::{DESCRIBE, DescriptionPart, GET_DATA, HASH};
+use rohrpost_modules::common::{DESCRIBE, GET_DATA, HASH};
+use rohrpost_modules::description::assemble;
 use rohrpost_modules::runtime::Context;
 use rohrpost_modules::wire::{append, from_bytes};
 use rohrpost_schema::Description;
 use std::rc::Rc;
 use std::time::Duration;
-
-/// Longest description that is asked for, bytes.
-const DESCRIPTION_MAX: usize = 1 << 20;
 
 /// A module that can be called.
 #[derive(Debug)]
@@ -42,8 +40,8 @@ impl Peers {
     }
 
     /// It is asked anew, since it is another by now.
-    pub(crate) fn forget(&mut self, peer: &Peer) {
-        self.0.retain(|(_, known)| known.name != peer.name);
+    pub(crate) fn forget(&mut self, module: &str) {
+        self.0.retain(|(known, _)| known != module);
     }
 }
 
@@ -79,22 +77,11 @@ fn describe(link: &Caller, module: Name, timeout: Duration) -> Result<Descriptio
         functions: Vec::new(),
         data: Vec::new(),
     };
-    let bad = |why: String| CallError::BadReply(module, why);
-    let mut bytes = Vec::new();
-    loop {
+    assemble(module, |from| {
         let mut arguments = Vec::new();
-        append(&mut arguments, &(bytes.len() as u32)).map_err(|error| CallError::BadArguments(error.to_string()))?;
+        append(&mut arguments, &from).map_err(|error| CallError::BadArguments(error.to_string()))?;
         let sequence = link.begin_bytes(module, DESCRIBE, (HASH, &common), timeout, &arguments)?;
         let reply = link.wait_bytes(sequence, module)?;
-        let part: DescriptionPart = from_bytes(&reply).map_err(|error| bad(error.to_string()))?;
-        // What it says of itself is a claim.
-        if part.total as usize > DESCRIPTION_MAX {
-            let text = format!("its description of {} bytes is longer than {DESCRIPTION_MAX}", part.total);
-            return Err(bad(text));
-        }
-        bytes.extend_from_slice(&part.bytes);
-        if bytes.len() >= part.total as usize || part.bytes.is_empty() {
-            return Description::from_bytes(&bytes).map_err(|error| bad(error.to_string()));
-        }
-    }
+        from_bytes(&reply).map_err(|error| CallError::BadReply(module, error.to_string()))
+    })
 }

@@ -75,7 +75,7 @@ fn what_is_right_is_taken_and_proved() {
     );
     let tokens = said.strip_prefix("accepted: ").unwrap_or_else(|| panic!("{said}")).replace([' ', '\n'], "");
     for words in [
-        "names(&self)->&'static[&'staticstr]{&[\"cruise-m-s\",\"type\"]}",
+        "names(&self)->::std::vec::Vec<&str>{::std::vec![\"cruise-m-s\",\"type\"]}",
         "rename_all=\"kebab-case\"",
         "deserialize_with=\"S::__read_cruise_m_s\"",
         "default=\"S::__default_cruise_m_s\"",

@@ -6,7 +6,8 @@ use super::clock::ModuleClock;
 use super::stream::{CheckedReader, Stream, StreamReadError};
 use crate::call::append;
 use crate::call::{CallError, Link, REPLIES_KEPT};
-use crate::common::{self, DescriptionPart};
+use crate::common;
+use crate::description::assemble;
 use crate::interface::StreamPort;
 use crate::journal::ModuleJournal;
 use rohrpost_config::Installation;
@@ -19,9 +20,6 @@ use std::time::Duration;
 
 /// Packages of subscribed data that may wait for a tool.
 const DATA_SLOTS: u16 = 128;
-
-/// Longest description that is asked for, bytes.
-const DESCRIPTION_MAX: usize = 1 << 20;
 
 /// Why a tool cannot take part.
 #[derive(Debug, thiserror::Error)]
@@ -268,21 +266,8 @@ impl ToolLink {
 /// # Errors
 /// See [`CallError`].
 pub fn describe(link: &mut Link, module: Name, timeout: Duration) -> Result<Description, CallError> {
-    let mut bytes = Vec::new();
-    loop {
-        let from = bytes.len() as u32;
+    assemble(module, |from| {
         let call = link.begin(module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))?;
-        let part: DescriptionPart = link.wait(call, |reply| postcard::from_bytes(reply))?;
-        // What it says of itself is a claim.
-        if part.total as usize > DESCRIPTION_MAX {
-            let text = format!("its description of {} bytes is longer than {DESCRIPTION_MAX}", part.total);
-            return Err(CallError::BadReply(module, text));
-        }
-        let last = part.bytes.is_empty();
-        bytes.extend_from_slice(&part.bytes);
-        if bytes.len() >= part.total as usize || last {
-            break;
-        }
-    }
-    Description::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
+        link.wait(call, |reply| postcard::from_bytes(reply))
+    })
 }

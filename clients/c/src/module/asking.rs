@@ -201,7 +201,7 @@ fn asked(
         let peer = context.peer(module, timeout).map_err(failed)?;
         let result = ask(context, &peer);
         if let Err(CallError::Fault(_, Fault::InterfaceDiffers { .. })) = &result {
-            context.forget(&peer);
+            context.forget(module);
         }
         result.map_err(failed)
     })?;

@@ -24,7 +24,10 @@ fn tools_take_it_for_a_module_like_any_other() {
     assert_eq!(described, eye::description());
     let hash = described.hash();
     let mut call = |number: u16, arguments: &[u8]| {
-        let write = |body: &mut Vec<u8>| Ok(body.extend_from_slice(arguments));
+        let write = |body: &mut Vec<u8>| {
+            body.extend_from_slice(arguments);
+            Ok(())
+        };
         tool.call(eye, number, hash, write, |reply| Ok(reply.to_vec()))
     };
     assert_eq!(call(LOOK, &[7]).unwrap(), [7, 0xee], "arguments and what the module adds");

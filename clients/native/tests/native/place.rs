@@ -68,12 +68,12 @@ impl Place {
 
     /// Runs the eye here, until it ends.
     pub(crate) fn run_eye(&self) -> Result<(), StartError> {
-        rohrpost_native::run(self.started("eye.0"), eye::interface(), |context| eye::Eye::make(context))
+        rohrpost_native::run(self.started("eye.0"), eye::interface(), eye::Eye::make)
     }
 
     pub(crate) fn start_eye(&self) {
         let start = self.started("eye.0");
-        std::thread::spawn(move || rohrpost_native::run(start, eye::interface(), |context| eye::Eye::make(context)));
+        std::thread::spawn(move || rohrpost_native::run(start, eye::interface(), eye::Eye::make));
     }
 
     /// What it sees.

@@ -1,4 +1,5 @@
-"""Rohrpost for Python: modules of robots, from any computer. :mod:`rohrpost.remote` takes part at a TCP router."""
+"""Rohrpost for Python: modules of robots, on the node (:func:`run`) and from any computer: :mod:`rohrpost.remote` takes
+part at a TCP router."""
 
 from .annotations import (
     F32, F64, I8, I16, I32, I64, I128, U8, U16, U32, U64, U128, Char, Choice, Length, data, said,
@@ -9,8 +10,9 @@ from .errors import (
     RohrpostError, TooManyCalls,
 )  # fmt: skip
 from .faults import Fault
-from .interface import Module, command, data_out, on_data, parameter
+from .interface import Module, command, data_out, every, on_data, on_record, parameter, stream
 from .names import BadName, Installation, Name
+from .node import is_available, run
 from .schema import Variant
 from .types import Image, ImageFormat, LaserScan, Odometry, Pose, Twist
 
@@ -19,5 +21,5 @@ __all__ = [
     "Fault", "FunctionError", "I8", "I16", "I32", "I64", "I128", "Image", "ImageFormat", "Installation", "LaserScan",
     "Length", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry", "OutputLevel", "Pose",
     "RohrpostError", "State", "Status", "TooManyCalls", "Twist", "U8", "U16", "U32", "U64", "U128", "Variant",
-    "command", "data", "data_out", "on_data", "parameter", "said",
+    "command", "data", "data_out", "every", "is_available", "on_data", "on_record", "parameter", "run", "said", "stream",
 ]  # fmt: skip

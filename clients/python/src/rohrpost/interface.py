@@ -5,11 +5,12 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, ContextManager, Protocol, TypeVar
 
 from .annotations import bound_of, field_of, first_paragraph, hints_of, said, type_of
 from .common import result_of
 from .errors import Misuse
+from .hosts import NodeHost
 from .schema import tree
 from .schema.description import DataItem, Description, Function
 from .schema.encode import encode
@@ -18,8 +19,13 @@ from .schema.text import show
 from .schema.tree import Field, Type
 from .wire import COMMAND_MAX, DATA_MAX, FIRST_OWN
 
+if TYPE_CHECKING:
+    from .node.streams import StreamReader
+
 F = TypeVar("F", bound=Callable[..., Any])
 _MARK = "__rohrpost__"
+RECORD_BYTES_MAX = 64 << 20
+"""Larger records are not taken, unless a program says so."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,30 @@ class OnData:
     newest: bool
 
 
+@dataclass(frozen=True)
+class OnRecord:
+    """What :func:`on_record` says."""
+
+    publisher: str
+    stream: str
+    most_bytes: int
+
+
+@dataclass(frozen=True)
+class StreamOut:
+    """What :func:`stream` says."""
+
+    number: int
+    unit: str
+
+
+@dataclass(frozen=True)
+class Every:
+    """What :func:`every` says."""
+
+    period_s: float
+
+
 def command(number: int, *, idempotent: bool = False, error: Any = None) -> Callable[[F], F]:
     """A function that others call, by its number, 16 and above.
 
@@ -71,6 +101,21 @@ def data_out(number: int, *, rate_hz: float | None = None, unit: str = "") -> Ca
     return _marked(DataOut(number, rate_hz, unit))
 
 
+def stream(number: int, *, unit: str = "") -> Callable[[F], F]:
+    """A stream that others read, by its name and the type that the function returns; it is never run. ``self.write``
+    and ``self.begin`` write its records. For modules on the node alone."""
+    if not 0 <= number <= DATA_MAX:
+        raise Misuse(f"stream {number}: numbers of streams are 0 to {DATA_MAX}")
+    return _marked(StreamOut(number, unit))
+
+
+def every(period_s: float) -> Callable[[F], F]:
+    """A function without arguments that is run once in so many seconds while the module is on."""
+    if not 0.0001 <= period_s <= 86_400:
+        raise Misuse(f"a period of {period_s} s: it is 0.0001 to 86400")
+    return _marked(Every(period_s))
+
+
 def on_data(publisher: str, data: str, *, period_s: float = 0.0, newest: bool = False) -> Callable[[F], F]:
     """A function that is run with each value of another module's data, such as ``"odometry.0", "odometry"``.
 
@@ -80,7 +125,14 @@ def on_data(publisher: str, data: str, *, period_s: float = 0.0, newest: bool = 
     return _marked(OnData(publisher, data, period_s, newest))
 
 
-def _marked(mark: Command | DataOut | OnData) -> Callable[[F], F]:
+def on_record(publisher: str, stream: str, *, most_bytes: int = RECORD_BYTES_MAX) -> Callable[[F], F]:
+    """A function that is run with the records of another module's stream, such as ``"camera.0", "image"``: with the
+    newest, whenever its turn comes. Records of more than ``most_bytes`` are not taken. If the function's argument has
+    an annotation, the records must be of that type."""
+    return _marked(OnRecord(publisher, stream, most_bytes))
+
+
+def _marked(mark: Command | DataOut | OnData | OnRecord | StreamOut | Every) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         setattr(function, _MARK, mark)
         return function
@@ -139,6 +191,9 @@ class Parameter:
     def __set__(self, instance: Any, value: Any) -> None:
         self.check(value, type(instance).__name__)
         instance.__dict__[self.name] = value
+        host = instance.__dict__.get("_host")
+        if isinstance(host, NodeHost):
+            host.parameter_set(instance, self, value)
 
 
 def parameter(default: Any, *, min: Any = None, max: Any = None, unit: str = "", text: str = "") -> Any:
@@ -176,7 +231,11 @@ class Interface:
     commands: dict[int, Handler] = field(default_factory=dict)
     outputs: dict[int, Handler] = field(default_factory=dict)
     inputs: list[Handler] = field(default_factory=list)
+    records: list[Handler] = field(default_factory=list)
     parameters: list[Parameter] = field(default_factory=list)
+    streams: dict[int, Handler] = field(default_factory=dict)
+    timed: list[Handler] = field(default_factory=list)
+    settings: tuple[str, ...] = ()
 
 
 class Module:
@@ -188,14 +247,17 @@ class Module:
             @rp.command(16)
             def close(self, force_n: float) -> Grip: ...
 
-    ``klass``: the class in the configuration. ``interface``: name of the interface, if not that of the class. Its
-    functions run one after the other, so they need no locks among themselves.
+    ``klass``: the class in the configuration. ``interface``: name of the interface, if not that of the class.
+    ``settings``: names of settings besides its parameters, for the node (:attr:`settings`). Its functions run one after
+    the other, so they need no locks among themselves.
     """
 
     interface_: ClassVar[Interface]
     _host: Host | None = None
 
-    def __init_subclass__(cls, klass: str | None = None, interface: str | None = None, **rest: Any) -> None:
+    def __init_subclass__(
+        cls, klass: str | None = None, interface: str | None = None, settings: tuple[str, ...] = (), **rest: Any
+    ) -> None:
         super().__init_subclass__(**rest)
         base: Interface | None = getattr(cls, "interface_", None)
         if klass is None and base is not None:
@@ -203,6 +265,7 @@ class Module:
         if klass is None:
             raise Misuse(f'{cls.__name__}: of which class is it? write `class {cls.__name__}(Module, klass="…")`')
         cls.interface_ = _interface(cls, klass, interface or cls.__name__)
+        cls.interface_.settings = tuple(settings) or (base.settings if base is not None else ())
 
     def switched_on(self) -> Any:
         """Its work begins. Yours to write; with asyncio it may be a coroutine."""
@@ -223,9 +286,55 @@ class Module:
         module is hosted by asyncio, each is to be awaited."""
         return self._hosted().proxy(self, name)
 
+    # On the node alone.
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the configuration says under ``settings``, without parameters."""
+        return self._on_node().settings
+
+    def now_ns(self) -> int:
+        """System time now, ns since 1970."""
+        return self._on_node().now_ns()
+
+    def write(self, stream: str, value: Any, time_ns: int | None = None) -> None:
+        """Writes a record of a stream by its name. ``time_ns``: when it was true, ns since 1970; none: now."""
+        self._on_node().write(self, stream, value, time_ns)
+
+    def begin(self, stream: str, value: Any, length: int, time_ns: int | None = None) -> ContextManager[memoryview]:
+        """A record that is filled in place: ``with self.begin("image", image, 6_220_800) as pixels: …``. The last field
+        of ``value`` is bytes, and empty; ``pixels`` is a writable view of so many. After the block it is a record; an
+        exception in the block gives it up."""
+        return self._on_node().begin(self, stream, value, length, time_ns)
+
+    def stream(self, module: str, stream: str, expected: Any = None, timeout_s: float = 1.0) -> StreamReader:
+        """A stream of another module, such as ``"camera.0", "image", rp.Image``, to look at when this one likes.
+        ``expected``: the type that its values must have; without it they are dicts, lists and numbers. The other module
+        is asked what it offers, at most ``timeout_s`` seconds."""
+        return self._on_node().stream(self, module, stream, expected, timeout_s)
+
+    def watch(self, file: Any, ready: Callable[[], Any], *, write: bool = False) -> int:
+        """Waits for a descriptor too, or for what has one (``fileno``): a serial line, a socket. While the module is on,
+        ``ready`` is run when there is something to read (``write``: room to write), again as long as there is. Returns
+        what :meth:`unwatch` takes."""
+        return self._on_node().watch(self, file, ready, write)
+
+    def unwatch(self, watch: int) -> bool:
+        """Waits for it no longer; false when it was not waited for."""
+        return self._on_node().unwatch(self, watch)
+
+    def _on_node(self) -> NodeHost:
+        host = self._hosted()
+        if not isinstance(host, NodeHost):
+            raise Misuse(f"{type(self).__name__} is not on the node: it has streams, settings and time there alone")
+        return host
+
     def _hosted(self) -> Host:
         if self._host is None:
-            raise Misuse(f'{type(self).__name__} is hosted by nobody yet; `client.host("name.0", module)` does it')
+            raise Misuse(
+                f'{type(self).__name__} is hosted by nobody yet; `client.host("name.0", module)` does it, or '
+                "`rohrpost.run` on the node"
+            )
         return self._host
 
 
@@ -233,8 +342,11 @@ def _interface(cls: type, klass: str, name: str) -> Interface:
     marked = [(key, getattr(value, _MARK)) for key, value in inspect.getmembers(cls) if hasattr(value, _MARK)]
     commands = [(key, mark) for key, mark in marked if isinstance(mark, Command)]
     outputs = [(key, mark) for key, mark in marked if isinstance(mark, DataOut)]
+    streams = [(key, mark) for key, mark in marked if isinstance(mark, StreamOut)]
     functions = tuple(_function(cls, key, mark) for key, mark in sorted(commands, key=lambda it: it[1].number))
-    data = tuple(_data(cls, key, mark) for key, mark in sorted(outputs, key=lambda it: it[1].number))
+    given: list[tuple[str, DataOut | StreamOut]] = [*outputs, *streams]
+    given.sort(key=lambda it: it[1].number)
+    data = tuple(_data(cls, key, mark) for key, mark in given)
     for what, numbers in (("command", [it.number for it in functions]), ("data", [it.number for it in data])):
         twice = {number for number in numbers if numbers.count(number) > 1}
         if twice:
@@ -243,6 +355,9 @@ def _interface(cls: type, klass: str, name: str) -> Interface:
     made.commands = {mark.number: Handler(key, mark) for key, mark in commands}
     made.outputs = {mark.number: Handler(key, mark) for key, mark in outputs}
     made.inputs = [Handler(key, mark, _input(cls, key)) for key, mark in marked if isinstance(mark, OnData)]
+    made.streams = {mark.number: Handler(key, mark) for key, mark in streams}
+    made.timed = [Handler(key, mark) for key, mark in marked if isinstance(mark, Every) and not _arguments(cls, key)[0]]
+    made.records = [Handler(key, mark, _input(cls, key)) for key, mark in marked if isinstance(mark, OnRecord)]
     hints = hints_of(cls) if any(isinstance(it, Parameter) for it in vars(cls).values()) else {}
     for base in reversed(cls.__mro__):
         for value in vars(base).values():
@@ -276,13 +391,14 @@ def _function(cls: type, name: str, mark: Command) -> Function:
     return Function(mark.number, name, fields, result, text, mark.idempotent)
 
 
-def _data(cls: type, name: str, mark: DataOut) -> DataItem:
+def _data(cls: type, name: str, mark: DataOut | StreamOut) -> DataItem:
     arguments, hints = _arguments(cls, name)
     where = f"{cls.__name__}.{name}"
     if arguments or "return" not in hints:
         raise Misuse(f"{where}: data take no arguments, and need the annotation of what they return")
     text = first_paragraph(getattr(cls, name).__doc__)
-    return DataItem(mark.number, Field(name, type_of(hints["return"], where), text, mark.unit))
+    field = Field(name, type_of(hints["return"], where), text, mark.unit)
+    return DataItem(mark.number, field, isinstance(mark, StreamOut))
 
 
 def _input(cls: type, name: str) -> Type | None:

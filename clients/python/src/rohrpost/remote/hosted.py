@@ -12,7 +12,7 @@ from ..common import (
 )  # fmt: skip
 from ..errors import FunctionError, Misuse, NotSent
 from ..faults import Fault
-from ..interface import Handler, Module
+from ..interface import DataOut, Handler, Module
 from ..names import Name
 from ..schema import tree
 from ..schema.binary import varint
@@ -67,6 +67,8 @@ class Hosted:
         work: WorkQueue,
         monotonic_ns: Callable[[], int],
     ) -> None:
+        if module.interface_.streams:
+            raise Misuse(f"{type(module).__name__} has streams, which are written on the node alone (`rohrpost.run`)")
         self.name = name
         self.module = module
         self.interface = module.interface_
@@ -84,6 +86,7 @@ class Hosted:
         self._parameters = Parameters(module)
         outputs = [it for it in self.interface.outputs.values() if it.mark.rate_hz]
         self._ticks = [_Tick(it, int(1e9 / it.mark.rate_hz), now_ns) for it in outputs]
+        self._ticks += [_Tick(it, int(1e9 * it.mark.period_s), now_ns) for it in self.interface.timed]
         self._switch(now_ns, True, None)
 
     # Commands.
@@ -369,7 +372,8 @@ class Hosted:
         def finish(now_ns: int, value: Any, error: BaseException | None) -> None:
             tick.is_queued = False
             try:
-                if error is None and self.state is State.On:
+                is_data = isinstance(tick.handler.mark, DataOut)
+                if error is None and self.state is State.On and is_data:
                     self.publish(now_ns, tick.handler.name, value, stamp_ns)
             except Misuse as wrong:
                 error = wrong

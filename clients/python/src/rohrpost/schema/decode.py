@@ -34,19 +34,22 @@ def decode(type: Type, data: bytes) -> Any:
 
 def decode_front(type: Type, data: bytes) -> tuple[Any, int]:
     """The value that ``data`` begins with, and how many bytes are left."""
-    decoder = _Decoder(data)
+    decoder = Decoder(data)
     value = decoder.value(type)
     return value, len(data) - decoder.at
 
 
-class _Decoder:
-    def __init__(self, data: bytes) -> None:
+class Decoder:
+    """Reads one value after the other."""
+
+    def __init__(self, data: bytes | memoryview) -> None:
         self.data = data
         self.at = 0
         self.depth = 0
         self.empty_left = EMPTY_MAX
 
     def value(self, type: Type) -> Any:
+        """The next one, which is of this type."""
         if self.depth >= DEPTH_MAX:
             raise WalkError(f"nested more than {DEPTH_MAX} deep")
         before = self.at
@@ -69,7 +72,7 @@ class _Decoder:
             return Variant("Some", inner) if is_nullable(type.inner) else inner
         if isinstance(type, List):
             if is_byte(type.element):
-                return self.counted()
+                return self.octets()
             length = self.length(type.is_of_empty)
             return [self.element(type.element, index) for index in range(length)]
         if isinstance(type, Array):
@@ -94,7 +97,7 @@ class _Decoder:
         if type == TEXT:
             return self.text()
         if type == BYTES:
-            return self.counted()
+            return self.octets()
         if type == CHAR:
             text = self.text()
             if len(text) != 1:
@@ -190,9 +193,18 @@ class _Decoder:
     def counted(self) -> bytes:
         return self.take(self.varint(64))
 
+    def octets(self) -> Any:
+        """Bytes that are a value."""
+        return self.counted()
+
     def take(self, length: int) -> bytes:
+        start = self.skip(length)
+        return bytes(self.data[start : self.at])
+
+    def skip(self, length: int) -> int:
+        """Passes over so many bytes; where they begin."""
         missing = length - (len(self.data) - self.at)
         if missing > 0:
             raise WalkError(f"{counted(missing, 'byte')} missing")
         self.at += length
-        return self.data[self.at - length : self.at]
+        return self.at - length

@@ -1,0 +1,68 @@
+"""Builds this package: with its part in Rust where that can be, else without.
+
+On Linux, in a copy of the repository and with Rust installed, `maturin` builds a wheel with `rohrpost._node`, which
+modules on the node need. Everywhere else, and with ``ROHRPOST_PURE=1``, the wheel has ``rohrpost.remote`` alone.
+"""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import shutil
+import sys
+import sysconfig
+from typing import Any
+
+_FOLDER = pathlib.Path(__file__).parents[1]
+_MATURIN, _HATCHLING = "maturin>=1.9,<2", "hatchling>=1.18"
+
+
+def _has_rust() -> bool:
+    """Whether the part in Rust can be built here."""
+    is_whole = (_FOLDER.parents[1] / "clients" / "native" / "Cargo.toml").is_file()
+    is_wanted = os.environ.get("ROHRPOST_PURE", "") in ("", "0")
+    return sys.platform == "linux" and is_whole and is_wanted and shutil.which("cargo") is not None
+
+
+def _wheels() -> Any:
+    if _has_rust():
+        import maturin
+
+        # It runs the program of its name, which is not on everybody's path.
+        os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", "")])
+        return maturin
+    import hatchling.build
+
+    return hatchling.build
+
+
+def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
+    """What has to be installed first."""
+    return [_MATURIN if _has_rust() else _HATCHLING]
+
+
+if _has_rust():
+    # Without this function a package is built to learn of it.
+    def prepare_metadata_for_build_wheel(metadata_directory: str, config_settings: Any = None) -> str:
+        """The package's description."""
+        name: str = _wheels().prepare_metadata_for_build_wheel(metadata_directory, config_settings)
+        return name
+
+
+def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:
+    """Builds it; the name of the file."""
+    name: str = _wheels().build_wheel(wheel_directory, config_settings, metadata_directory)
+    return name
+
+
+def get_requires_for_build_sdist(config_settings: Any = None) -> list[str]:
+    """What has to be installed first."""
+    return [_HATCHLING]
+
+
+def build_sdist(sdist_directory: str, config_settings: Any = None) -> str:
+    """Sources, from which a package without its part in Rust is built."""
+    import hatchling.build
+
+    name: str = hatchling.build.build_sdist(sdist_directory, config_settings)
+    return name

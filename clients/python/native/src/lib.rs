@@ -1,0 +1,39 @@
+//! The part of the package `rohrpost` that is Rust: a module in Python on a node, over [`rohrpost_native`].
+//!
+//! ```text
+//! rohrpost.node (Python) ── run ──▶ runtime's loop, without the interpreter's lock
+//!        ▲                               │ takes the lock for each call
+//!        └── Bridge's methods ◀──────────┘ and lends its context to the thread meanwhile
+//! ```
+//!
+//! The interpreter's lock is given back wherever something is waited for.
+
+mod bridge;
+mod calls;
+mod fails;
+mod lent;
+mod publishing;
+mod streams;
+mod values;
+mod watching;
+
+use pyo3::prelude::*;
+
+/// `rohrpost._node`; its types are in `_node.pyi`.
+#[pymodule]
+mod _node {
+    #[pymodule_export]
+    use crate::bridge::run;
+    #[pymodule_export]
+    use crate::calls::{call, forget, get, peer};
+    #[pymodule_export]
+    use crate::lent::forked;
+    #[pymodule_export]
+    use crate::publishing::{abandon, begin, finish, follow, now, publish, say, set_parameter, set_period};
+    #[pymodule_export]
+    use crate::streams::{Stream, open_stream};
+    #[pymodule_export]
+    use crate::values::Shared;
+    #[pymodule_export]
+    use crate::watching::{unwatch, watch};
+}

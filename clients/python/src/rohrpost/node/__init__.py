@@ -1,0 +1,58 @@
+"""Modules on the node: launched, watched, switched, restarted and called like those in Rust.
+
+::
+
+    import rohrpost as rp
+
+    class Gripper(rp.Module, klass="gripper"): ...
+
+    rp.run(Gripper)
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import signal
+import sys
+import threading
+from typing import NoReturn
+
+from ..errors import Misuse
+from ..interface import Module
+
+__all__ = ["is_available", "run"]
+
+
+def is_available() -> bool:
+    """Whether this package was built with its part in Rust, so that modules run on the node."""
+    return importlib.util.find_spec("rohrpost._node") is not None
+
+
+def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
+    """Runs a module until it is told to end, and ends the process: the last line of its program.
+
+    Launch tells it by its environment what it is; by hand say ``--config FILE --name CLASS.INSTANCE``, or give it as
+    ``arguments``. Raises :class:`rohrpost.Misuse` where it cannot run at all.
+    """
+    if not is_available():
+        raise Misuse(
+            "this package was installed without its part in Rust, so it has no modules on the node: on Linux, with "
+            "Rust installed, `pip install ./clients/python` builds it; `rohrpost.remote` takes part from anywhere"
+        )
+    if threading.current_thread() is not threading.main_thread():
+        raise Misuse("`rohrpost.run` is for the main thread: it takes the signals that end a module")
+    from .. import _node
+    from .bridge import Bridge
+    from .output import listen
+
+    os.register_at_fork(after_in_child=_node.forked)
+    # Its runtime goes to the safe state at these, and ends then. Python's own would raise in the middle of that.
+    for ends in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(ends, signal.SIG_DFL)
+    listen()
+    bridge = Bridge(module)
+    given = sys.argv[1:] if arguments is None else arguments
+    settings = list(module.interface_.settings)
+    code = _node.run(given, module.interface_.description.to_bytes(), bridge.parameters(), settings, bridge)
+    sys.exit(code)

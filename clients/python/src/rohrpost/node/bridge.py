@@ -1,0 +1,280 @@
+"""Between a module's class and the runtime in Rust, which calls :class:`Bridge`."""
+
+from __future__ import annotations
+
+import functools
+import json
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from .. import _node
+from ..errors import FunctionError, Misuse
+from ..hosts import NodeHost
+from ..interface import Handler, Module, OnRecord, Parameter
+from ..schema import tree
+from ..schema.binary import field_from_bytes, field_to_bytes, type_to_bytes
+from ..schema.decode import decode
+from ..schema.description import DataItem
+from ..schema.encode import encode
+from ..schema.errors import WalkError
+from ..schema.text import describe_type
+from ..schema.tree import Tuple, Type
+from ..remote.calling import expected_type
+from .failures import words_of
+from .proxies import NodeProxy
+from .streams import StreamReader
+from .timed import Timed
+from .views import Held, View, kept
+
+if TYPE_CHECKING:
+    from .._node import Shared
+
+_LOG = logging.getLogger(__name__)
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _told(method: F) -> Callable[..., str | None]:
+    """Runs the author's code: what it raises becomes the text with which the module is in error."""
+
+    @functools.wraps(method)
+    def run(self: Bridge, *arguments: Any) -> str | None:
+        try:
+            method(self, *arguments)
+        except BaseException as error:  # Also `sys.exit`: a module ends when launch says so.
+            return self._failed(error)
+        return None
+
+    return run
+
+
+class Bridge(NodeHost):
+    """One module. Its public functions without a module as argument are for the runtime, and raise nothing."""
+
+    def __init__(self, module: type[Module]) -> None:
+        self._class = module
+        self._interface = module.interface_
+        self._items = {item.name: item for item in self._interface.description.data}
+        self._functions = {function.number: function for function in self._interface.description.functions}
+        self._module: Module | None = None
+        self._settings: dict[str, Any] = {}
+        self._followed: dict[int, Handler] = {}
+        self._types: dict[tuple[str, bytes], Type] = {}
+        self._timed = Timed([*self._interface.timed, *self._interface.outputs.values()])
+        self._is_configuring = False
+        self._watched: dict[int, Callable[[], Any]] = {}
+
+    def parameters(self) -> list[tuple[bytes, bytes]]:
+        """Bytes of the field and of the default of each."""
+        return [(field_to_bytes(it.field), encode(it.field.type, it.default)) for it in self._interface.parameters]
+
+    # For the runtime.
+
+    @_told
+    def make(self, name: str, settings: str, values: list[tuple[str, bytes]]) -> None:
+        """Makes the module, switched off."""
+        self._settings = json.loads(settings)
+        # Before its own `__init__`, which may want its settings and parameters.
+        module = self._module = self._class.__new__(self._class)
+        module._host = self
+        self._configure(values)
+        module.__init__()  # type: ignore[misc]
+        for handler in (*self._interface.inputs, *self._interface.records):
+            its = handler.mark
+            if isinstance(its, OnRecord):
+                follow = _node.follow(its.publisher, its.stream, 0.0, False, True)
+            else:
+                follow = _node.follow(its.publisher, its.data, its.period_s, its.newest, False)
+            self._followed[follow] = handler
+        if self._timed.period_s is not None:
+            _node.set_period(self._timed.period_s)
+
+    @_told
+    def on(self) -> None:
+        """Its work begins."""
+        self._timed.restart()
+        self._its().switched_on()
+
+    @_told
+    def off(self) -> None:
+        """It goes to its safe state."""
+        self._its().switched_off()
+
+    @_told
+    def tick(self) -> None:
+        """Runs what is due."""
+        module = self._its()
+        now_ns, _, epoch = _node.now()
+        for handler in self._timed.due(now_ns, epoch):
+            value = getattr(module, handler.name)()
+            if handler.name in self._items:
+                self.publish(module, handler.name, value, now_ns)
+
+    @_told
+    def received(
+        self, follow: int, field: bytes, data: bytes | Shared, stamp_ns: int, sequence: int, missed: int
+    ) -> None:
+        """Data or a record that one of its functions follows."""
+        handler = self._followed[follow]
+        its = handler.mark
+        what = f"`{its.stream}`" if isinstance(its, OnRecord) else f"`{its.data}`"
+        type = self._type(field, handler, f"{what} of {its.publisher}")
+        try:
+            held = Held(type, data)
+        except WalkError as error:
+            raise Misuse(f"{what} of {its.publisher} cannot be read: {error}") from None
+        try:
+            getattr(self._its(), handler.name)(held.value)
+        finally:
+            is_free = held.release()
+        if not is_free:
+            raise kept(f"record {sequence} of {what} of {its.publisher}")
+
+    @_told
+    def ready(self, watch: int, readable: bool, writable: bool) -> None:
+        """A descriptor is ready, or at its end."""
+        if watch in self._watched:
+            self._watched[watch]()
+
+    def command(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
+        """Runs a function: its result; or none, whether the arguments are to blame, and why."""
+        function, handler = self._functions[number], self._interface.commands[number]
+        try:
+            fields = Tuple(tuple(field.type for field in function.arguments))
+            values = decode(fields, arguments)
+        except WalkError as error:
+            return None, True, str(error)
+        has_error = handler.mark.error is not None
+        try:
+            value = getattr(self._its(), handler.name)(*values)
+            result = tree.Variant("Ok", value) if has_error else value
+        except BaseException as error:  # As above.
+            if not (has_error and isinstance(error, FunctionError)):
+                return None, False, self._failed(error)
+            result = tree.Variant("Err", error.value)
+        try:
+            return encode(function.result, result), False, ""
+        except WalkError as error:
+            return None, False, f"the result of `{handler.name}` cannot be written: {error}"
+
+    def parameters_set(self, values: list[tuple[str, bytes]]) -> str | None:
+        """Parameters have new values; why the module does not want them."""
+        module = self._its()
+        old = {it.name: getattr(module, it.name) for it in self._interface.parameters}
+        self._configure(values)
+        try:
+            module.parameters_set()
+        except BaseException as error:  # It is the author's word, whatever its class.
+            module.__dict__.update(old)
+            return str(error) or words_of(error)
+        return None
+
+    # For the module.
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        return self._settings
+
+    def publish(self, module: Module, data: str, value: Any, time_ns: int | None) -> None:
+        item = self._item(data, is_stream=False)
+        _node.publish(item.number, time_ns, self._encoded(item, value))
+
+    def write(self, module: Module, stream: str, value: Any, time_ns: int | None) -> None:
+        item = self._item(stream, is_stream=True)
+        _node.publish(item.number, time_ns, self._encoded(item, value))
+
+    @contextmanager
+    def begin(
+        self, module: Module, stream: str, value: Any, length: int, time_ns: int | None
+    ) -> Iterator[memoryview]:
+        item = self._item(stream, is_stream=True)
+        shared = _node.begin(item.number, time_ns, self._encoded(item, value), length)
+        own = bytearray(length if shared is None else 0)
+        view = None if shared is None else View(shared, is_writable=True)
+        try:
+            yield memoryview(own) if view is None else view.whole
+        except BaseException:
+            _node.abandon()
+            if view is not None:
+                view.release()
+            raise
+        if view is not None and not view.release():
+            _node.abandon()
+            raise kept(f"a record of `{stream}` that is being filled")
+        _node.finish(bytes(own))
+
+    def proxy(self, module: Module, name: str) -> NodeProxy:
+        return NodeProxy(name, 1.0)
+
+    def now_ns(self) -> int:
+        return _node.now()[0]
+
+    def stream(self, module: Module, name: str, stream: str, expected: Any, timeout_s: float) -> StreamReader:
+        opened, field = _node.open_stream(name, stream, timeout_s)
+        what = f"`{stream}` of {name}"
+        return StreamReader(opened, self._checked(field, expected_type(expected), what, "it is opened for"), what)
+
+    def watch(self, module: Module, file: Any, ready: Callable[[], Any], write: bool) -> int:
+        number = _node.watch(file if isinstance(file, int) else file.fileno(), not write, write)
+        self._watched[number] = ready
+        return number
+
+    def unwatch(self, module: Module, watch: int) -> bool:
+        self._watched.pop(watch, None)
+        return _node.unwatch(watch)
+
+    def parameter_set(self, module: Module, parameter: Parameter, value: Any) -> None:
+        if not self._is_configuring:
+            _node.set_parameter(parameter.field.name, encode(parameter.field.type, value))
+
+    # Its own.
+
+    def _its(self) -> Module:
+        assert self._module is not None
+        return self._module
+
+    def _failed(self, error: BaseException) -> str:
+        _LOG.debug("in the module's code", exc_info=error)
+        return words_of(error)
+
+    def _configure(self, values: list[tuple[str, bytes]]) -> None:
+        by_name = {it.field.name: it for it in self._interface.parameters}
+        self._is_configuring = True
+        try:
+            for name, data in values:
+                setattr(self._module, by_name[name].name, decode(by_name[name].field.type, data))
+        finally:
+            self._is_configuring = False
+
+    def _item(self, name: str, is_stream: bool) -> DataItem:
+        item = self._items.get(name)
+        if item is None or item.is_stream != is_stream:
+            what = "stream" if is_stream else "data"
+            names = ", ".join(it.name for it in self._items.values() if it.is_stream == is_stream)
+            raise Misuse(f"{self._class.__name__} has no {what} `{name}`; it has: {names or 'none'}")
+        return item
+
+    def _encoded(self, item: DataItem, value: Any) -> bytes:
+        try:
+            return encode(item.field.type, value)
+        except WalkError as error:
+            raise Misuse(f"{self._class.__name__}.{item.name}: {error.within('value')}") from None
+
+    def _type(self, field: bytes, handler: Handler, what: str) -> Type:
+        """The type of what came, with the author's classes, if the function names one."""
+        found = self._types.get((handler.name, field))
+        if found is None:
+            found = self._checked(field, handler.type, what, f"`{handler.name}` takes")
+            self._types[handler.name, field] = found
+        return found
+
+    @staticmethod
+    def _checked(field: bytes, ours: Type | None, what: str, wants: str) -> Type:
+        theirs = field_from_bytes(field).type
+        if ours is None:
+            return theirs
+        if type_to_bytes(ours, True) != type_to_bytes(theirs, True):
+            words = f"{what} is {describe_type(theirs)}, but {wants} {describe_type(ours)}"
+            raise Misuse(f"{words}; names of types and units count, too")
+        return ours

@@ -1,0 +1,99 @@
+"""Views of shared memory that are there for a while, and say so afterwards.
+
+::
+
+    Shared (Rust: keeps the memory mapped) ◀── an array of ctypes ◀── memoryview ◀── what an author makes of it
+
+What an author keeps of it keeps the array, and that the memory: no view ever leads nowhere. But its bytes are those of
+another record by then, so it is told.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from typing import TYPE_CHECKING, Any
+
+from ..errors import Misuse
+from ..schema.decode import Decoder
+from ..schema.errors import WalkError, counted
+from ..schema.tree import Type
+
+if TYPE_CHECKING:
+    from .._node import Shared
+
+VIEWED_MIN = 1024
+"""Shorter bytes in a value are copied: that is quicker than a view."""
+
+
+class View:
+    """Bytes of a record while they are lent."""
+
+    def __init__(self, shared: Shared, is_writable: bool = False) -> None:
+        array: Any = (ctypes.c_ubyte * shared.length).from_address(shared.address)
+        array.keeps = shared
+        self._array = weakref.ref(array)
+        whole = memoryview(array).cast("B")
+        self.whole = whole if is_writable else whole.toreadonly()
+        self._lent = [whole, self.whole]
+
+    def part(self, start: int, end: int) -> memoryview:
+        """Some of them."""
+        part = self.whole[start:end]
+        self._lent.append(part)
+        return part
+
+    def release(self) -> bool:
+        """They are lent no more; whether nothing of them was kept."""
+        for view in reversed(self._lent):
+            try:
+                view.release()
+            except BufferError:  # An array of numpy is made of it, say.
+                return False
+        self._lent.clear()
+        del self.whole
+        return self._array() is None
+
+
+class Held:
+    """The value of a record, while it is held: ``bytes`` of it are views, if they are many."""
+
+    def __init__(self, type: Type, data: bytes | Shared) -> None:
+        self._view: View | None = None
+        if isinstance(data, bytes):
+            decoder = Decoder(data)
+        else:
+            self._view = View(data)
+            decoder = _ViewDecoder(self._view)
+        try:
+            self.value = decoder.value(type)
+            left = len(decoder.data) - decoder.at
+            if left:
+                raise WalkError(f"{counted(left, 'byte')} too many")
+        except BaseException:
+            self.release()
+            raise
+
+    def release(self) -> bool:
+        """It is held no more; whether nothing of its memory was kept."""
+        self.__dict__.pop("value", None)
+        view, self._view = self._view, None
+        return view is None or view.release()
+
+
+class _ViewDecoder(Decoder):
+    def __init__(self, view: View) -> None:
+        super().__init__(view.whole)
+        self._view = view
+
+    def octets(self) -> Any:
+        length = self.varint(64)
+        start = self.skip(length)
+        return self._view.part(start, self.at) if length >= VIEWED_MIN else bytes(self.data[start : self.at])
+
+
+def kept(what: str) -> Misuse:
+    """What is told of a view that was kept."""
+    return Misuse(
+        f"a view of {what} is kept, and shows other bytes from now on; copy what you keep: `bytes(…)`, `numpy.array(…)`"
+    )

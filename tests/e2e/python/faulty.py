@@ -1,0 +1,219 @@
+#!/usr/bin/env python3
+"""A gripper that does what it should not, when it is asked to."""
+
+import atexit
+import logging
+import os
+import sys
+import threading
+
+import rohrpost as rp
+
+
+@rp.data
+class Note:
+    """Words, and bytes."""
+
+    words: str
+    more: bytes
+
+
+def said(part) -> str:
+    """What a mistake says."""
+    try:
+        return f"no exception, but {part()!r}"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+
+
+class Gripper(rp.Module, klass="gripper", settings=("mood",)):
+    """Does what tests ask of it."""
+
+    gain: rp.U8 = rp.parameter(2, max=9)
+
+    def __init__(self) -> None:
+        self.mood = self.settings["mood"]
+        self.orders: list[str] = []
+        self.kept = None
+        self.seen = 0
+        self.heard = ""
+
+    def switched_off(self) -> None:
+        logging.info("safe, in a mood that is %s", self.mood)
+
+    def parameters_set(self) -> None:
+        if self.gain == 7:
+            raise ValueError("not seven")
+
+    @rp.command(16)
+    def order(self, what: str) -> None:
+        """What the next picture is for."""
+        self.orders.append(what)
+
+    @rp.command(17)
+    def fail(self, why: str) -> None:
+        """Fails."""
+        raise RuntimeError(why)
+
+    @rp.command(18)
+    def leave(self) -> None:
+        """Wants to end."""
+        sys.exit(3)
+
+    @rp.command(19)
+    def wrong(self) -> rp.U8:
+        """Returns what does not fit."""
+        return 300
+
+    @rp.command(20)
+    def elsewhere(self) -> str:
+        """In a thread of its own."""
+        told: list[str] = []
+        thread = threading.Thread(target=lambda: told.append(said(self.now_ns)))
+        thread.start()
+        thread.join()
+        return told[0]
+
+    @rp.command(21)
+    def forked(self) -> str:
+        """In a child."""
+        reads, writes = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.write(writes, said(self.now_ns).encode())
+            os._exit(0)
+        os.waitpid(child, 0)
+        return os.read(reads, 500).decode()
+
+    @rp.command(22)
+    def strayed(self) -> int:
+        """A child that comes back."""
+        child = os.fork()
+        if child == 0:
+            return 1
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+    @rp.command(23)
+    def calls(self) -> list[str]:
+        """What goes wrong with other modules."""
+        motor = self.proxy("motor.0")
+        return [
+            said(lambda: motor.fly(1)),
+            said(lambda: motor.drive("fast", 0)),
+            said(lambda: motor.drive(float("nan"), 0)),
+            said(lambda: self.proxy("nothing.0").drive()),
+            said(lambda: self.publish("grip", "wide")),
+            said(lambda: self.publish("grab", 1.0)),
+            said(lambda: self.stream("motor.0", "motion")),
+            said(lambda: self.stream("camera.0", "image", rp.Pose)),
+            said(lambda: self.begin("edge", 0, 5).__enter__()),
+        ]
+
+    @rp.command(24)
+    def looks(self) -> list[str]:
+        """At the camera's stream."""
+        camera = self.stream("camera.0", "image", rp.Image, timeout_s=20)
+        told = []
+        with camera.next(timeout_s=20) as record:
+            view, number, time_ns = record.value.pixels, record.sequence, record.time_ns
+            told.append(f"{type(view).__name__} of {len(view)}, {said(lambda: camera.newest().__enter__())}")
+        told.append(said(lambda: view[0]))
+        with camera.at(time_ns) as record:
+            told.append(f"the same: {record.sequence == number}")
+        told.append(said(lambda: camera.around(1)).split(" ns")[0])
+        threading.Thread(target=lambda: told.append(said(lambda: camera.missed()))).run()
+        other: list[str] = []
+        thread = threading.Thread(target=lambda: other.append(said(lambda: camera.missed())))
+        thread.start()
+        thread.join()
+        return told + other
+
+    @rp.command(26)
+    def hears(self, word: str) -> None:
+        """By a pipe that it watches."""
+        reads, writes = os.pipe()
+
+        def ready() -> None:
+            self.heard = os.read(reads, 100).decode()
+            self.unwatch(watch)
+            os.close(reads)
+
+        watch = self.watch(reads, ready)
+        os.write(writes, word.encode())
+        os.close(writes)
+
+    @rp.command(27)
+    def heard_word(self) -> str:
+        """What it heard."""
+        return self.heard + ", " + said(lambda: self.watch(-1, print))
+
+    @rp.command(28)
+    def gains(self) -> rp.U8:
+        """What it reckons with."""
+        return self.gain
+
+    @rp.command(29)
+    def notes(self) -> list[str]:
+        """Small records, which do not lie in place; one that is given up, and one whose view is kept."""
+        self.write("note", Note("whole", b"xyz"))
+        with self.begin("note", Note("filled", b""), 4) as room:
+            room[:] = b"abcd"
+            told = [said(lambda: self.write("note", Note("between", b"")))]
+
+        def given_up(keeps: bool) -> None:
+            with self.begin("wide", Note("given up", b""), 5000) as room:
+                self.kept = room[1:] if keeps else None
+                if not keeps:
+                    raise RuntimeError("no")
+
+        return [*told, said(lambda: given_up(False)), said(lambda: given_up(True))]
+
+    @rp.stream(3)
+    def note(self) -> "Note":
+        """What it notes."""
+
+    @rp.stream(4)
+    def wide(self) -> "Note":
+        """The same, with more room."""
+
+    @rp.command(25)
+    def sees(self) -> rp.U32:
+        """Pictures so far."""
+        return self.seen
+
+    @rp.on_record("camera.0", "image")
+    def look(self, image: rp.Image) -> None:
+        self.seen += 1
+        what = self.orders.pop() if self.orders else ""
+        if what == "fail":
+            raise RuntimeError("it is dark")
+        if what == "keep":
+            self.kept = image.pixels[1:]
+
+    @rp.data_out(1)
+    def grip(self) -> float:
+        """How."""
+        return 0.0
+
+    @rp.stream(2)
+    def edge(self) -> float:
+        """Of what."""
+        return 0.0
+
+
+if os.fork() == 0:
+    # Before it runs, a child is a process like any other.
+    os._exit(0)
+gripper = None
+atexit.register(lambda: print(said(lambda: gripper.now_ns()), flush=True))
+
+
+class Remembered(Gripper, interface="Gripper"):
+    """The same, remembered after its end."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        globals()["gripper"] = self
+
+
+rp.run(Remembered)

@@ -1,0 +1,294 @@
+//! Modules in Python on the node: the gripper of the book beside a simulated robot, and what goes wrong in Python.
+
+use crate::harness::{Place, Robot, signal, wait};
+use crate::process::Running;
+use nix::sys::signal::Signal;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+const FAULTY: &str = include_str!("python/faulty.py");
+const PAGE: &str = include_str!("../../docs/src/python-node.md");
+const CONFIG: &str = r#"
+installation = "test"
+[system]
+name = "robot"
+id = 1
+[classes]
+motor = { id = 200 }
+odometry = { id = 160 }
+laser = { id = 150 }
+camera = { id = 120 }
+gripper = { id = 110 }
+output = { id = 32 }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+[nodes.main]
+[[module]]
+name = "output.0"
+builtin = "output"
+[[module]]
+name = "gripper.0"
+program = "./gripper.py"
+calls = ["motor.0", "odometry.0", "camera.0"]
+settings = { SETTINGS }
+[module.stream.edge]
+record = "1 MiB"
+STREAMS
+[[module]]
+name = "motor.0"
+aliases = ["odometry.0", "laser.0", "camera.0"]
+builtin = "sim"
+settings = { map = MAP, seed = 1, odometry-rate-hz = 20, camera-rate-hz = 20 }
+[module.stream.image]
+record = "1 MiB"
+"#;
+
+/// A robot with a gripper in Python. Dropped in this order.
+struct Scene {
+    launch: Running,
+    robot: Robot,
+    place: Place,
+}
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+/// The package with its part in Rust, which is built by the profile of this workspace.
+fn package(place: &Place) -> PathBuf {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args(["build", "--offline", "--quiet", "--package", "rohrpost-python"]).current_dir(repository());
+    let built = cargo.output().unwrap();
+    assert!(built.status.success(), "{built:?}");
+    // target/debug/deps/e2e-…
+    let library = std::env::current_exe().unwrap().ancestors().nth(2).unwrap().join("lib_node.so");
+    let (path, sources) = (place.path("package"), repository().join("clients/python/src/rohrpost"));
+    std::fs::create_dir_all(path.join("rohrpost")).unwrap();
+    for entry in std::fs::read_dir(sources).unwrap().map(|entry| entry.unwrap()) {
+        symlink(entry.path(), path.join("rohrpost").join(entry.file_name())).unwrap();
+    }
+    symlink(library, path.join("rohrpost/_node.abi3.so")).unwrap();
+    path
+}
+
+/// With a section for each stream that this program has.
+fn configured(map: &str, settings: &str, code: &str) -> String {
+    let streams = if code == FAULTY { "[module.stream.wide]\nrecord = \"64 KiB\"\n" } else { "" };
+    CONFIG.replace("MAP", map).replace("SETTINGS", settings).replace("STREAMS", streams)
+}
+
+/// The book's gripper.
+fn gripper() -> &'static str {
+    PAGE.split("```python gripper.py\n").nth(1).unwrap().split("```").next().unwrap()
+}
+
+impl Scene {
+    /// Launches it with this code, and settings of the gripper.
+    fn launched(code: &str, settings: &str) -> Self {
+        let place = Place::new();
+        let package = package(&place);
+        let (config, program) = (place.path("robot.toml"), place.path("gripper.py"));
+        let map = format!("{:?}", repository().join("config/building.map"));
+        std::fs::write(&config, configured(&map, settings, code)).unwrap();
+        std::fs::write(&program, code).unwrap();
+        std::fs::set_permissions(&program, PermissionsExt::from_mode(0o755)).unwrap();
+        let mut command = place.command(&["launch", config.to_str().unwrap()]);
+        // Beside the sources nothing is to be written.
+        command.env("PYTHONPATH", package).env("PYTHONDONTWRITEBYTECODE", "1");
+        let mut launch = Running::start(command);
+        let robot = place.robot(&config, "main", &mut launch);
+        Self { launch, robot, place }
+    }
+
+    fn with_gripper() -> Self {
+        let mut scene = Self::launched(gripper(), "speed-m-s = 0.06");
+        scene.robot.wait_on(&mut scene.launch);
+        scene
+    }
+
+    fn says(&self, arguments: &[&str]) -> crate::process::Said {
+        self.place.say(arguments)
+    }
+
+    fn written(&self, stream: &str) -> u64 {
+        let told = self.says(&["stream", "info", "gripper.0", stream, "--json"]).json();
+        told["written"].as_u64().unwrap_or(0)
+    }
+
+    fn stop(mut self) {
+        drop(self.robot);
+        self.launch.stop();
+        self.place.assert_empty();
+    }
+}
+
+#[test]
+fn the_gripper_of_the_book_is_a_module_like_any_other() {
+    let scene = Scene::with_gripper();
+    let listed = scene.says(&["list", "--json"]).ok();
+    assert!(listed.contains("\"gripper.0\""), "{listed}");
+    assert!(scene.says(&["status", "gripper.0"]).ok().contains("\ngripper.0  on "));
+    assert_eq!(scene.says(&["call", "gripper.0", "close", "4"]).ok(), "{width_m: 0.02, force_n: 4}\n");
+    let refused = scene.says(&["call", "gripper.0", "close", "40"]);
+    assert_eq!(
+        (refused.code, refused.out.trim()),
+        (Some(1), "gripper.0 answers with an error: \"more than 20 N break it\"")
+    );
+    let said = scene.says(&["call", "gripper.0"]).ok();
+    for words in ["Holds things, and stops the robot while it takes them.", "close <force_n: f64>", "How it holds now."]
+    {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let held = scene.says(&["echo", "gripper.0", "grip", "--count", "1"]).ok();
+    assert!(held.ends_with("{width_m: 0.02, force_n: 4}\n"), "{held}");
+    // Parameters: as configured, set, and refused.
+    assert_eq!(scene.says(&["param", "get", "gripper.0", "speed-m-s", "--json"]).json()[0]["value"], 0.06);
+    assert_eq!(
+        scene.says(&["param", "set", "gripper.0", "speed-m-s", "0.1"]).ok(),
+        "gripper.0 speed-m-s: 0.06 -> 0.1 m/s\n"
+    );
+    assert!(scene.says(&["param", "set", "gripper.0", "speed-m-s", "0.3"]).fails().contains("out of range: 0..=0.2"));
+    // It reads the camera's stream in place, and writes its own in place, which a tool in Rust reads.
+    wait("it has seen pictures", || (scene.written("edge") > 3).then_some(()));
+    let edge = scene.says(&["stream", "read", "gripper.0", "edge"]).ok();
+    assert!(edge.contains("height_px: 16") && edge.contains("Rgb8"), "{edge}");
+    // Killed, it is started again, and its stream goes on.
+    let (pid, before) = (scene.robot.pid("gripper.0"), scene.written("edge"));
+    signal(pid, Signal::SIGKILL);
+    scene.robot.wait_restarted("gripper.0", pid);
+    assert_eq!(scene.says(&["call", "gripper.0", "close", "5"]).ok(), "{width_m: 0.02, force_n: 5}\n");
+    wait("it sees pictures again", || (scene.written("edge") > before).then_some(()));
+    for (order, state) in [("off", "off"), ("on", "on")] {
+        scene.says(&["call", "gripper.0", order]).ok();
+        assert_eq!(scene.robot.state("gripper.0"), state);
+    }
+    scene.stop();
+}
+
+/// What a command answers, as text.
+fn answers(scene: &Scene, command: &str) -> String {
+    scene.says(&["call", "--json", "gripper.0", command]).ok()
+}
+
+#[test]
+fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
+    let mut scene = Scene::launched(FAULTY, "mood = \"good\"");
+    scene.robot.wait_on(&mut scene.launch);
+    let line = |of: &str| FAULTY.lines().position(|line| line.contains(of)).unwrap() + 1;
+    let again = || {
+        scene.says(&["call", "gripper.0", "off"]).ok();
+        scene.says(&["call", "gripper.0", "on"]).ok();
+    };
+    // Functions that others call.
+    for (words, told) in [
+        (&["fail", "broken"][..], format!("RuntimeError: broken (./gripper.py:{})", line("raise RuntimeError(why)"))),
+        (&["leave"], format!("SystemExit: 3 (./gripper.py:{})", line("sys.exit(3)"))),
+        (&["wrong"], "the result of `wrong` cannot be written: 300 is out of range: u8 is 0 to 255".into()),
+    ] {
+        let told = told.replace("./", scene.place.path("").to_str().unwrap());
+        let failed = scene.says(&[&["call", "gripper.0"], words].concat()).fails();
+        assert!(failed.contains(&format!("the module is in error: {told}")), "{failed}: {told}");
+        let status = scene.says(&["status", "gripper.0"]).out;
+        assert!(status.contains("error") && status.contains(&told), "{status}");
+        again();
+    }
+    // Those that run with a picture; a view that is kept.
+    for (order, told) in [("fail", "RuntimeError: it is dark ("), ("keep", "Misuse: a view of record ")] {
+        scene.says(&["call", "gripper.0", "order", order]).ok();
+        wait(format!("it is in error: {order}"), || (scene.robot.state("gripper.0") == "error").then_some(()));
+        let status = scene.says(&["status", "gripper.0"]).out;
+        assert!(status.contains(told), "{status}");
+        again();
+    }
+    let set = scene.says(&["param", "set", "gripper.0", "gain", "7"]).fails();
+    assert!(set.contains("the module refuses: not seven"), "{set}");
+    assert_eq!(scene.says(&["param", "get", "gripper.0", "gain", "--json"]).json()[0]["value"], 2);
+    assert_eq!(answers(&scene, "gains").trim(), "2", "the module has its old value again");
+    // It still sees.
+    let seen: u32 = answers(&scene, "sees").trim().parse().unwrap();
+    wait("it sees", || (answers(&scene, "sees").trim().parse::<u32>().unwrap() > seen).then_some(()));
+    scene.stop();
+}
+
+#[test]
+fn threads_forks_and_the_end_are_told_by_exceptions() {
+    let mut scene = Scene::launched(FAULTY, "mood = \"good\"");
+    scene.robot.wait_on(&mut scene.launch);
+    let own = "for a module's own functions, in its own thread, while it runs";
+    assert!(answers(&scene, "elsewhere").contains(own), "{}", answers(&scene, "elsewhere"));
+    assert!(answers(&scene, "forked").contains("this process was forked from a module's"));
+    assert_eq!(answers(&scene, "strayed").trim(), "70", "a child that comes back is ended");
+    let calls = answers(&scene, "calls");
+    for words in [
+        "has no function `fly`; it has: drive, halt",
+        "BadArguments: the arguments cannot be written: speed_m_s: expected a number (f64), got `fast`",
+        "FunctionError: NotFinite",
+        "RohrpostError: ",
+        "Misuse: Remembered.grip: value: expected a number (f64), got `wide`",
+        "Misuse: Remembered has no data `grab`; it has: grip",
+        "but it is opened for {x_m: f64, y_m: f64, heading_rad: f64}",
+        "is no stream; follow it as data",
+        "is not filled in place",
+    ] {
+        assert!(calls.contains(words), "{words}: {calls}");
+    }
+    scene.says(&["call", "gripper.0", "hears", "tick"]).ok();
+    wait("it hears", || answers(&scene, "heard_word").contains("tick, Misuse: -1 is no open").then_some(()));
+    let notes = answers(&scene, "notes");
+    for words in
+        ["Misuse: a record is being filled", "RuntimeError: no", "Misuse: a view of a record of `wide` that is"]
+    {
+        assert!(notes.contains(words), "{words}: {notes}");
+    }
+    let noted = scene.says(&["stream", "read", "gripper.0", "note"]).ok();
+    assert!(noted.contains("{words: \"filled\", more: [97, 98, 99, 100]}"), "{noted}");
+    assert_eq!((scene.written("note"), scene.written("wide")), (2, 0));
+    let looks = answers(&scene, "looks");
+    for words in [
+        "memoryview of ",
+        "leave its `with` before",
+        "ValueError: operation forbidden",
+        "the same: True",
+        "was opened in another thread",
+    ] {
+        assert!(looks.contains(words), "{words}: {looks}");
+    }
+    scene.stop();
+}
+
+#[test]
+fn by_hand_it_says_why_it_does_not_start_and_ends_by_control_c() {
+    let place = Place::new();
+    let (package, config) = (package(&place), place.path("robot.toml"));
+    std::fs::write(place.path("gripper.py"), FAULTY).unwrap();
+    let started = |settings: &str, arguments: &[&str]| {
+        std::fs::write(&config, configured("\"no.map\"", settings, FAULTY)).unwrap();
+        let mut command = Command::new("python3");
+        command.arg("-B").arg("gripper.py").args(arguments).current_dir(place.path(""));
+        command.env("PYTHONPATH", &package).env("ROHRPOST_DIR", place.memory());
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Running::start(command)
+    };
+    let named = ["--config", config.to_str().unwrap(), "--name", "gripper.0"];
+    for (settings, arguments, code, told) in [
+        ("mood = \"good\"", &named[..2], 2, "which module of it?"),
+        ("mod = \"good\"", &named[..], 1, "it has no setting `mod`; it has gain, mood"),
+        ("mood = \"good\", gain = 11", &named[..], 1, "`gain` is 11, out of range: at most 9"),
+        ("", &named[..], 1, "KeyError: 'mood'"),
+    ] {
+        let settings = if settings.is_empty() { "gain = 1" } else { settings };
+        let said = started(settings, arguments).said();
+        assert!(said.code == Some(code) && said.err.contains(told), "{told}: {said:?}");
+    }
+    let mut module = started("mood = \"good\"", &named);
+    wait("it is on", || {
+        module.assert_runs();
+        place.say_at(&config, "main", &["status", "gripper.0"]).out.contains("\ngripper.0  on ").then_some(())
+    });
+    module.signal(Signal::SIGINT);
+    let said = module.said();
+    assert!(said.code == Some(0) && said.err.contains("safe, in a mood that is good"), "{said:?}");
+    assert!(said.out.contains("Misuse: this is for a module's own functions"), "{said:?}");
+}
