@@ -12,7 +12,7 @@ import traceback
 
 STOP = 2**64 - 1
 # Before a turn begins, where ends must find each other first.
-GREETING = STOP - 1
+HANDSHAKE = STOP - 1
 # As the bench's own turns: with fewer samples a turn goes on after its cap.
 SAMPLES_MIN = 50
 

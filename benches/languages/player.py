@@ -5,11 +5,11 @@ import signal
 
 import rohrpost as rp
 
-from ping_pong import GREETING, Ping, Pong, Turn, ends_when_it_fails, message_of
+from ping_pong import HANDSHAKE, Ping, Pong, Turn, ends_when_it_fails, message_of
 
 turn = Turn()
 own, other = ("player.0", "player.1") if turn.is_ping else ("player.1", "player.0")
-greeting = message_of(GREETING, turn.bytes)
+handshake = message_of(HANDSHAKE, turn.bytes)
 
 
 class Player(rp.Module, klass="player"):
@@ -25,15 +25,15 @@ class Player(rp.Module, klass="player"):
 
     @rp.every(0.02)
     @ends_when_it_fails
-    def greet(self) -> None:
+    def begin(self) -> None:
         # Subscriptions take a moment.
         if turn.is_ping and not self.has_begun:
-            self.publish("ball", greeting)
+            self.publish("ball", handshake)
 
     @rp.on_data(other, "ball")
     @ends_when_it_fails
     def came(self, ball: bytes) -> None:
-        if ball == greeting:
+        if ball == handshake:
             if not turn.is_ping:
                 self.publish("ball", ball)
             elif not self.has_begun:

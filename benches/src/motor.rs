@@ -98,9 +98,10 @@ impl Module for CommandedMotor {
     }
 }
 
+/// Of modules that are told nothing by their configuration.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-struct NoSettings {}
+pub(crate) struct NoSettings {}
 
 impl Motor for CommandedMotor {
     fn drive(&mut self, speed_m_s: f64, _: f64) -> Result<(), DriveError> {

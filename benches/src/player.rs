@@ -2,7 +2,8 @@
 //! Python is `benches/languages/player.py`. It is this program again, with the arguments of a
 //! [`crate::harness::ForeignProgram`].
 
-use crate::harness::{Cell, Failure, ForeignProgram, Placement, Scheduling, check_echo, fill};
+use crate::harness::{Cell, Failure, ForeignProgram, Placement, SAMPLES_MIN, Scheduling, check_echo, fill};
+use crate::motor::NoSettings;
 use nix::sys::signal::{Signal, raise};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_modules::runtime::{Context, Rate, Received, Start, Subscription, run_started};
@@ -14,12 +15,10 @@ use std::time::Duration;
 
 /// Set for the hidden program that is the module.
 const ROLE: &str = "ROHRPOST_BENCH_PLAYER";
-/// With fewer samples a turn goes on after its cap.
-const SAMPLES_MIN: usize = 50;
 /// The number that ends a turn, and the one before it begins: subscriptions take a moment.
 const STOP: u64 = u64::MAX;
-const GREETING: u64 = STOP - 1;
-const GREETING_EACH: Duration = Duration::from_millis(20);
+const HANDSHAKE: u64 = STOP - 1;
+const HANDSHAKE_EACH: Duration = Duration::from_millis(20);
 
 static TURN: OnceLock<PlayerTurn> = OnceLock::new();
 
@@ -76,10 +75,6 @@ trait Player {
     fn ball() -> Vec<u8>;
 }
 
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NoSettings {}
-
 struct BallPlayer {
     turn: &'static PlayerTurn,
     balls: Subscription<Vec<u8>>,
@@ -101,7 +96,7 @@ impl Module for BallPlayer {
         let other = if turn.is_ping { "player.1" } else { "player.0" };
         let balls = context.subscribe(PlayerInterface::BALL, other, Rate::Each)?;
         if turn.is_ping {
-            context.set_period(GREETING_EACH);
+            context.set_period(HANDSHAKE_EACH);
         }
         let (number, message) = (0, vec![0; turn.cell.bytes]);
         let round_trips = Vec::with_capacity(turn.cell.messages);
@@ -109,10 +104,10 @@ impl Module for BallPlayer {
         Ok(Self { turn, balls, number, message, sent_ns: 0, began_ns: None, is_warm, round_trips })
     }
 
-    /// Throws a greeting until one comes back.
+    /// Throws one that does not count, until it comes back.
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         if self.began_ns.is_none() {
-            self.throw(context, GREETING)?;
+            self.throw(context, HANDSHAKE)?;
         }
         Ok(())
     }
@@ -144,7 +139,7 @@ impl BallPlayer {
             self.began_ns = Some(back_ns);
             return self.throw(context, 0);
         };
-        if number_of(ball) == Some(GREETING) {
+        if number_of(ball) == Some(HANDSHAKE) {
             return Ok(());
         }
         check_echo(&self.message, ball)?;
@@ -167,7 +162,7 @@ impl BallPlayer {
     fn echo(&mut self, context: &mut Context, ball: &Vec<u8>) -> Result<(), ModuleError> {
         match number_of(ball) {
             Some(STOP) => return Ok(raise(Signal::SIGTERM)?),
-            Some(GREETING) => {}
+            Some(HANDSHAKE) => {}
             Some(number) if number == self.number => self.number += 1,
             number => return Err(Failure::Failed(format!("ball {number:?} came when {} was due", self.number)).into()),
         }

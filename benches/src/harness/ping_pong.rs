@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 /// A finished turn with fewer samples goes on: on busy processors without real-time scheduling, a round trip can
 /// take milliseconds.
-const SAMPLES_MIN: usize = 50;
+pub const SAMPLES_MIN: usize = 50;
 
 /// Bytes at the head of each message: its number. All other bytes follow from it.
 const NUMBER_BYTES: usize = 8;

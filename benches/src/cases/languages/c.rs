@@ -1,6 +1,6 @@
 //! Mailboxes by the library for C, beside Rust: packages of 64 bytes, copied in and out.
 
-use super::{BYTES, at_most, cell};
+use super::turn::{BYTES, at_most, cell};
 use crate::cases::Case;
 use crate::cases::latency;
 use crate::harness::{Cell, Failure, ForeignProgram, Scratch, time_two_programs};

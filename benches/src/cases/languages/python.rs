@@ -1,7 +1,7 @@
 //! Modules in Python on one node: data between two of them, beside the same in Rust and what else there is for Python;
 //! pictures that are read in place; and calls of a module in Rust.
 
-use super::{BYTES, at_most, cell};
+use super::turn::{BYTES, at_most, cell};
 use crate::cases::Case;
 use crate::cases::case::as_failure;
 use crate::harness::{
@@ -82,15 +82,15 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
 }
 
 /// A node of its own, by its files.
-struct Place {
+struct ScratchNode {
     scratch: Scratch,
 }
 
-impl Place {
+impl ScratchNode {
     fn new() -> Result<Self, Failure> {
-        let place = Self { scratch: Scratch::new()? };
-        fs::write(place.config(), CONFIGURATION).map_err(|error| Failure::of("configuration", error))?;
-        Ok(place)
+        let node = Self { scratch: Scratch::new()? };
+        fs::write(node.config(), CONFIGURATION).map_err(|error| Failure::of("configuration", error))?;
+        Ok(node)
     }
 
     fn config(&self) -> PathBuf {
@@ -119,12 +119,12 @@ impl Case for Between {
         let (cell, python) = (cell(settings), Interpreter::of(settings));
         let contenders = [
             Contender::sampled("Python", || {
-                let place = Place::new()?;
+                let place = ScratchNode::new()?;
                 let program = place.runs(&python, "player.py", &[])?;
                 one_way(time_two_programs(&cell, &place.scratch, |_| program.clone()))
             }),
             Contender::sampled("Rust", || {
-                let place = Place::new()?;
+                let place = ScratchNode::new()?;
                 let program = player(&place.scratch.directory(), &place.config())?;
                 one_way(time_two_programs(&cell, &place.scratch, |_| program.clone()))
             }),
@@ -163,7 +163,7 @@ struct Picture {
 impl Picture {
     /// Microseconds of each.
     fn turn(&self, cell: &Cell, python: &Interpreter, (size, stream): ([usize; 2], &str)) -> Result<Vec<f64>, Failure> {
-        let (place, [width, height]) = (Place::new()?, size.map(|pixels| pixels.to_string()));
+        let (place, [width, height]) = (ScratchNode::new()?, size.map(|pixels| pixels.to_string()));
         let program = place.runs(python, "picture.py", &[&width, &height, stream])?;
         time_two_programs(cell, &place.scratch, |_| program.clone())
     }
@@ -229,8 +229,8 @@ impl Case for Called {
 }
 
 /// The module that is called; it ends with what is given.
-fn called(cell: &Cell) -> Result<(Place, Child), Failure> {
-    let place = Place::new()?;
+fn called(cell: &Cell) -> Result<(ScratchNode, Child), Failure> {
+    let place = ScratchNode::new()?;
     let motor = start_motor(&place.scratch.directory(), &place.config(), cell.placement)?;
     Ok((place, motor))
 }

@@ -9,7 +9,7 @@
 //! ```
 //! All of them there and back again.
 
-use super::{BYTES, at_most, cell};
+use super::turn::{BYTES, at_most, cell};
 use crate::cases::Case;
 use crate::cases::tcp::TcpSegment;
 use crate::harness::{Cell, Child, End, Failure, Scratch, time_one_program, time_two_programs};
