@@ -52,3 +52,81 @@ impl RecordPlace {
         self.len == 0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::RecordPlace;
+    use crate::name::Name;
+    use crate::node::Node;
+    use crate::participant::Participant;
+    use crate::stream::ring::Stamp;
+    use crate::stream::shape::{StreamId, StreamShape};
+    use crate::stream::writer::StreamWriter;
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    const BYTES: usize = 10_000;
+
+    fn participant(folder: &tempfile::TempDir) -> Arc<Participant> {
+        let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
+        Participant::join(&node, Name::new(1, 200, 0, 0)).unwrap()
+    }
+
+    fn writer(participant: &Arc<Participant>) -> (StreamId, StreamWriter) {
+        let id = StreamId { name: Name::new(1, 200, 0, 0), number: 1 };
+        let shape = StreamShape { record_bytes: BYTES as u32, keep: 2, readers: 1, late: Duration::ZERO };
+        (id, participant.stream_writer(id, shape).unwrap())
+    }
+
+    fn stamp(number: u8) -> Stamp {
+        Stamp { epoch: 1, ns: 1 + u64::from(number) }
+    }
+
+    fn bytes(place: &RecordPlace) -> Vec<u8> {
+        // SAFETY: so many bytes of a mapping that `place` keeps; no other thread writes them in these tests.
+        unsafe { std::slice::from_raw_parts(place.address().as_ptr(), place.len()) }.to_vec()
+    }
+
+    #[test]
+    fn what_stays_is_whole_until_its_reader_takes_another_and_mapped_for_longer() {
+        let folder = tempfile::tempdir().unwrap();
+        let participant = participant(&folder);
+        let (id, mut writer) = writer(&participant);
+        let mut reader = participant.stream_reader(id).unwrap();
+        writer.write(stamp(0), &[0; BYTES]).unwrap();
+        let place = reader.newest().unwrap().unwrap().stay();
+        for number in 1..20 {
+            writer.write(stamp(number), &[number; BYTES]).unwrap();
+            assert_eq!(bytes(&place), [0; BYTES], "{number}");
+        }
+        drop(reader.newest().unwrap());
+        for number in 20..40 {
+            writer.write(stamp(number), &[number; BYTES]).unwrap();
+        }
+        drop((reader, writer));
+        let there = bytes(&place);
+        assert!(there.iter().all(|byte| *byte == there[0]), "it is mapped, whatever record has the place");
+    }
+
+    #[test]
+    fn a_record_that_was_suspended_is_filled_by_its_place_and_finished_or_given_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let participant = participant(&folder);
+        let (_, mut writer) = writer(&participant);
+        for number in 0..20 {
+            let open = writer.begin(stamp(number)).unwrap();
+            let place = open.at().unwrap();
+            let suspended = open.suspend();
+            assert_eq!((place.len(), writer.written()), (BYTES, u64::from(number)), "nothing is there yet");
+            // SAFETY: the record is being filled, so its bytes are this thread's alone.
+            unsafe { place.address().as_ptr().write_bytes(number, 7) };
+            let given_up = writer.resume(suspended);
+            drop(given_up);
+            let again = writer.begin(stamp(number)).unwrap().suspend();
+            let mut open = writer.resume(again);
+            open.body_mut()[..7].fill(number);
+            let (sequence, seen) = open.finish_seen(7).unwrap();
+            assert_eq!((sequence, seen), (u64::from(number), &[number; 7][..]));
+        }
+    }
+}

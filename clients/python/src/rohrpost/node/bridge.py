@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from .. import _node
 from ..errors import FunctionError, Misuse
 from ..hosts import NodeHost
-from ..interface import Handler, Module, OnRecord, Parameter
+from ..interface import DataOut, Handler, Module, OnRecord, Parameter
 from ..schema import tree
 from ..schema.binary import field_from_bytes, field_to_bytes, type_to_bytes
 from ..schema.decode import decode
@@ -56,6 +56,7 @@ class Bridge(NodeHost):
         self._class = module
         self._interface = module.interface_
         self._items = {item.name: item for item in self._interface.description.data}
+        self._numbered = {item.number: item for item in self._items.values()}
         self._functions = {function.number: function for function in self._interface.description.functions}
         self._module: Module | None = None
         self._settings: dict[str, Any] = {}
@@ -108,8 +109,9 @@ class Bridge(NodeHost):
         now_ns, _, epoch = _node.now()
         for handler in self._timed.due(now_ns, epoch):
             value = getattr(module, handler.name)()
-            if handler.name in self._items:
-                self.publish(module, handler.name, value, now_ns)
+            if isinstance(handler.mark, DataOut):
+                item = self._numbered[handler.mark.number]
+                _node.publish(item.number, now_ns, self._encoded(item, value))
 
     @_told
     def received(
