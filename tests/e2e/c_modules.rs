@@ -112,14 +112,16 @@ fn book(place: &Place, name: &str) -> PathBuf {
     compiled(place, &place.path(name))
 }
 
-/// Compiles a program with the library that Cargo has put beside this one.
+/// Compiles a program with the library that Cargo has put beside this one. Wherever it reads or writes what is not its
+/// own, it ends, and its test fails.
 fn compiled(place: &Place, source: &Path) -> PathBuf {
     let library = std::env::current_exe().unwrap().parent().unwrap().to_owned();
     let program = place.path(source.file_stem().unwrap().to_str().unwrap());
     let is_c = source.extension().unwrap() == "c";
     let (compiler, standard) = if is_c { ("cc", "-std=c11") } else { ("c++", "-std=c++17") };
     let output = Command::new(compiler)
-        .args([standard, "-Wall", "-Wextra", "-Werror", "-D_GNU_SOURCE", "-o"])
+        .args([standard, "-Wall", "-Wextra", "-Werror", "-D_GNU_SOURCE"])
+        .args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-o"])
         .arg(&program)
         .arg(source)
         .arg(format!("-I{}", client().join("include").display()))
