@@ -61,7 +61,8 @@ impl Interpreter {
     /// [`Failure::Skipped`] when it has not; [`Failure::Failed`] when there is no such interpreter.
     pub fn require(&self, imports: &str) -> Result<(), Failure> {
         let name = self.program.display();
-        self.says(&format!("import {imports}"))?.map(drop).map_err(|why| {
+        // Without the folder in which the bench runs: a folder there may have a package's name.
+        self.says(&format!("import sys; del sys.path[0]; import {imports}"))?.map(drop).map_err(|why| {
             Failure::Skipped(format!("{name} cannot `import {imports}` ({why}); name one that can with --python"))
         })
     }
