@@ -17,7 +17,7 @@ use std::process::{Command, Stdio};
 
 const PAGE: &str = include_str!("../../docs/src/c.md");
 
-const CLASSES: &str = "
+pub(crate) const CLASSES: &str = "
 [classes.thermometer]
 id = 120
 [classes.counter]
@@ -100,7 +100,7 @@ fn client() -> PathBuf {
 }
 
 /// Compiles an example.
-fn example(place: &Place, name: &str) -> PathBuf {
+pub(crate) fn example(place: &Place, name: &str) -> PathBuf {
     compiled(place, &client().join(format!("examples/{name}.c")))
 }
 
@@ -135,12 +135,12 @@ fn compiled(place: &Place, source: &Path) -> PathBuf {
 }
 
 /// A module's lines in a configuration.
-fn entry(name: &str, program: &str, more: &str) -> String {
+pub(crate) fn entry(name: &str, program: &str, more: &str) -> String {
     format!("[[module]]\nname = \"{name}\"\nprogram = {program}\n{more}\n")
 }
 
 /// What a module says that it has seen.
-fn seen(place: &Place, module: &str) -> u64 {
+pub(crate) fn seen(place: &Place, module: &str) -> u64 {
     place.say(&["call", module, "seen"]).ok().trim().parse().unwrap()
 }
 

@@ -33,6 +33,7 @@ mod interface;
 mod lan;
 mod lan_tools;
 mod languages;
+mod languages_killed;
 mod launch;
 mod lines;
 mod log_file;

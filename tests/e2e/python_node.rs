@@ -57,7 +57,7 @@ fn repository() -> PathBuf {
 }
 
 /// The package with its part in Rust, which is built by the profile of this workspace.
-fn package(place: &Place) -> PathBuf {
+pub(crate) fn package(place: &Place) -> PathBuf {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.args(["build", "--offline", "--quiet", "--package", "rohrpost-python"]).current_dir(repository());
     let built = cargo.output().unwrap();

@@ -1,0 +1,131 @@
+//! One stream and its readers in three languages, killed again and again: a camera in C writes, modules in C, Rust and
+//! Python read in place. Those that are not killed go on, pictures are whole, and accounts balance as in Rust.
+
+use crate::c_modules::{CLASSES, entry, example, seen};
+use crate::harness::{OUTPUT, Place, Robot, signal, wait};
+use crate::python_node::package;
+use nix::sys::signal::Signal;
+use rohrpost::Name;
+use rohrpost::interfaces::CameraInterface;
+use rohrpost_mailbox::{ClassTraffic, Loss, Next, Participant, StreamId, StreamReader};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Reads the camera's pictures in Python.
+const SEER: &str = include_str!("python/seer.py");
+const READERS: [&str; 3] = ["viewer.0", "looker.0", "seer.0"];
+const ALL: [&str; 4] = ["camera.0", "viewer.0", "looker.0", "seer.0"];
+/// Of the camera's pictures.
+const WIDTH: usize = 320;
+const HEIGHT: usize = 240;
+const RESTART: &str = "restart = { backoff = \"50 ms\", at-most = 1000, within = \"50 ms\" }";
+
+/// How often one of them is killed: for a long run,
+/// `ROHRPOST_KILLS=200 cargo test -p rohrpost-cli --test e2e languages_killed`.
+fn kills() -> usize {
+    std::env::var("ROHRPOST_KILLS").ok().map_or(8, |kills| kills.parse().unwrap())
+}
+
+/// The module in Python, which finds the package where it was built.
+fn seer(place: &Place) -> PathBuf {
+    let path = place.path("seer.py");
+    std::fs::write(&path, SEER.replace("PACKAGE", package(place).to_str().unwrap())).unwrap();
+    std::fs::set_permissions(&path, PermissionsExt::from_mode(0o755)).unwrap();
+    path
+}
+
+fn modules(place: &Place) -> Vec<String> {
+    let quoted = |path: &Path| format!("{path:?}");
+    let looker =
+        format!("[{:?}, \"--exact\", \"c_modules::module\", \"--nocapture\"]", std::env::current_exe().unwrap());
+    let stream = "[module.stream.image]\nrecord = \"256 KiB\"\nkeep = 4\n";
+    let reads = format!("calls = [\"camera.0\"]\n{RESTART}");
+    vec![
+        CLASSES.into(),
+        "[classes.seer]\nid = 107\n[scheduling]\nreal-time-from = 256\n".into(),
+        OUTPUT.into(),
+        entry("camera.0", &quoted(&example(place, "camera")), &format!("{RESTART}\n{stream}")),
+        entry("viewer.0", &quoted(&example(place, "viewer")), &reads),
+        entry("looker.0", &looker, &reads),
+        entry("seer.0", &quoted(&seer(place)), &reads),
+    ]
+}
+
+/// Reads all that there is; each picture is of one number, as the camera makes them.
+fn read_rest(reader: &mut StreamReader) {
+    loop {
+        match reader.next().unwrap() {
+            Next::Nothing => return,
+            Next::Lost(_) => {}
+            Next::Record(record) => {
+                let pixels = record.body().last_chunk::<{ HEIGHT * WIDTH * 3 }>().unwrap();
+                for (index, pixel) in pixels.chunks(3).enumerate() {
+                    let expected = [pixels[0], (index / WIDTH) as u8, (index % WIDTH) as u8];
+                    assert_eq!(pixel, expected, "pixel {index} of {:?}", record.info());
+                }
+            }
+        }
+    }
+}
+
+/// What was accepted was received, is lost for a cause, or waits; each death may have interrupted one.
+fn check_mailboxes(robot: &Robot, deaths: u64) {
+    for name in robot.node.mailboxes().unwrap() {
+        let Some(found) = robot.node.look_at(name) else { continue };
+        let accepted = || Loss::ALL.into_iter().filter(|cause| cause.was_accepted());
+        let passed = |class: &ClassTraffic| class.received + accepted().map(|cause| class.lost(cause)).sum::<u64>();
+        let accounted = found.classes.iter().map(passed).sum::<u64>() + u64::from(found.depth);
+        assert!(found.sent.abs_diff(accounted) <= deaths, "{deaths} deaths, {accounted} accounted for: {found:?}");
+    }
+}
+
+/// Each reader sees pictures that it had not seen.
+fn go_on(place: &Place, reader: &mut StreamReader, before: [u64; 3]) {
+    for (module, before) in READERS.into_iter().zip(before) {
+        wait(format!("{module} sees on"), || {
+            read_rest(reader);
+            (seen(place, module) > before).then_some(())
+        });
+    }
+}
+
+/// Kills one of them, and only that one is started again.
+fn kill(place: &Place, robot: &Robot, reader: &mut StreamReader, victim: &str) {
+    let pids = || ALL.map(|module| (module, robot.pid(module)));
+    let others = |pids: [(&'static str, u32); 4]| pids.into_iter().filter(|(module, _)| *module != victim);
+    let (before, pid) = (pids(), robot.pid(victim));
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted(victim, pid);
+    go_on(place, reader, READERS.map(|module| if module == victim { 0 } else { seen(place, module) }));
+    assert!(others(pids()).eq(others(before)), "{:?} were {before:?}", pids());
+}
+
+#[test]
+fn modules_in_c_rust_and_python_are_killed_and_the_others_go_on() {
+    let place = Place::new();
+    let modules = modules(&place);
+    let (mut launch, robot) = place.launched(&modules.iter().map(String::as_str).collect::<Vec<_>>());
+    let participant = Participant::join(&robot.node, Name::NONE).unwrap();
+    let id = StreamId { name: robot.name("camera.0"), number: CameraInterface::IMAGE.number };
+    let mut reader = participant.stream_reader(id).unwrap();
+    let began = reader.position();
+    go_on(&place, &mut reader, [0; 3]);
+    // One after the other, in another order each time round, and at other moments of their periods.
+    let victims: Vec<&str> = (0..kills()).map(|kill| ALL[(kill * 3 + kill / ALL.len()) % ALL.len()]).collect();
+    for (at, victim) in victims.iter().enumerate() {
+        std::thread::sleep(Duration::from_millis(at as u64 * 7 % 50));
+        kill(&place, &robot, &mut reader, victim);
+    }
+    place.say(&["stop", "camera.0"]).ok();
+    read_rest(&mut reader);
+    let told = robot.node.inspect_stream(id).unwrap().unwrap();
+    let (read, lost) = reader.accounts();
+    assert_eq!(read + lost, told.written - began, "{read} read, {lost} lost");
+    let adoptions = victims.iter().filter(|victim| **victim == "camera.0").count();
+    assert_eq!((told.adoptions as usize, told.refused), (adoptions, 0));
+    check_mailboxes(&robot, victims.len() as u64);
+    drop((reader, participant, robot));
+    launch.stop();
+    place.assert_empty();
+}
