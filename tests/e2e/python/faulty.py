@@ -121,6 +121,16 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         with camera.at(time_ns) as record:
             told.append(f"the same: {record.sequence == number}")
         told.append(said(lambda: camera.around(1)).split(" ns")[0])
+        there = camera.interpolated(time_ns)
+        told.append(f"in between: {type(there).__name__}, {type(there.pixels).__name__} of {there.height_px} rows")
+        odometry = self.stream("odometry.0", "odometry", rp.Odometry, timeout_s=20)
+        stamps = []
+        for _ in range(2):
+            with odometry.next(timeout_s=20) as record:
+                stamps.append((record.time_ns, record.value.pose.x_m))
+        (before_ns, before_m), (after_ns, after_m) = stamps
+        x_m = odometry.interpolated((before_ns + after_ns) // 2).pose.x_m
+        told.append(f"half way: {abs(x_m - (before_m + after_m) / 2) < 1e-6}")
         threading.Thread(target=lambda: told.append(said(lambda: camera.missed()))).run()
         other: list[str] = []
         thread = threading.Thread(target=lambda: other.append(said(lambda: camera.missed())))

@@ -216,7 +216,8 @@ class Bridge(NodeHost):
     def stream(self, module: Module, name: str, stream: str, expected: Any, timeout_s: float) -> StreamReader:
         opened, field = _node.open_stream(name, stream, timeout_s)
         what = f"`{stream}` of {name}"
-        return StreamReader(opened, self._checked(field, expected_type(expected), what, "it is opened for"), what)
+        type = self._checked(field, expected_type(expected), what, "it is opened for")
+        return StreamReader(opened, type, field_from_bytes(field).unit, what)
 
     def watch(self, module: Module, file: Any, ready: Callable[[], Any], write: bool) -> int:
         number = _node.watch(file if isinstance(file, int) else file.fileno(), not write, write)

@@ -8,11 +8,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ..between import between
 from ..errors import BadReply, Misuse, RohrpostError
 from ..names import Name
+from ..schema.decode import decode
 from ..schema.errors import WalkError
 from ..schema.tree import Type
-from .views import Held, kept
+from .views import Held, View, kept
 
 if TYPE_CHECKING:
     from .._node import Shared, Stream
@@ -53,8 +55,8 @@ class StreamReader:
             look(record.value.pixels)
     """
 
-    def __init__(self, stream: Stream, type: Type, what: str) -> None:
-        self._stream, self._what = stream, what
+    def __init__(self, stream: Stream, type: Type, unit: str, what: str) -> None:
+        self._stream, self._unit, self._what = stream, unit, what
         self._thread = threading.get_ident()
         self._held: Held | None = None
         self.type = type
@@ -84,10 +86,7 @@ class StreamReader:
     @contextmanager
     def record(self, sequence: int) -> Iterator[Record]:
         """The record of this number. Raises :class:`NoRecord` if it is there no more, or not yet."""
-        found = self._own().record(sequence)
-        if found is None:
-            raise NoRecord(f"record {sequence} of {self._what} is there no more, or not yet")
-        with self._hold(*found) as record:
+        with self._hold(*self._record(sequence)) as record:
             yield record
 
     def around(self, time_ns: int) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -104,6 +103,32 @@ class StreamReader:
         (before, before_ns), (after, after_ns) = self.around(time_ns)
         with self.record(before if time_ns - before_ns <= after_ns - time_ns else after) as record:
             yield record
+
+    def interpolated(self, time_ns: int) -> Any:
+        """The value at a time, between those of the two records around it. Numbers with a fraction go in a straight
+        line, those of unit ``rad`` the short way round; all else comes from the record that is nearer in time. Raises
+        :class:`NoRecord` as :meth:`around` does."""
+        (before, before_ns), (after, after_ns) = self.around(time_ns)
+        start, end = (self._copied(it) for it in (before, after))
+        return between(self.type, self._unit, start, end, (time_ns - before_ns) / max(after_ns - before_ns, 1))
+
+    def _record(self, sequence: int) -> tuple[int, int, int, bytes | Shared]:
+        found = self._own().record(sequence)
+        if found is None:
+            raise NoRecord(f"record {sequence} of {self._what} is there no more, or not yet")
+        return found
+
+    def _copied(self, sequence: int) -> Any:
+        """The value of a record, which stays when the record goes."""
+        *_, data = self._record(sequence)
+        if not isinstance(data, bytes):
+            view = View(data)
+            data = bytes(view.whole)
+            view.release()
+        try:
+            return decode(self.type, data)
+        except WalkError as error:
+            raise BadReply(Name(0), f"{self._what}: {error}") from None
 
     def missed(self) -> dict[str, int]:
         """Records missed on the way by cause: ``lost`` by the network, ``sampled`` out by the configuration,
