@@ -55,7 +55,7 @@ pub(crate) unsafe fn described(table: &InterfaceTable) -> Result<Description, Co
         let name = needed_text(table.name, "name of the interface")?.to_owned();
         let functions = list(table.functions, table.function_count, "functions")?;
         let data = list(table.data, table.data_count, "data")?;
-        let description = Description {
+        let mut description = Description {
             class: needed_text(table.class_name, "class of the interface")?.to_owned(),
             text: text(table.text, "text of the interface")?.unwrap_or_default().to_owned(),
             functions: functions.iter().map(|function| reader.function(function)).collect::<Result<_, _>>()?,
@@ -63,6 +63,9 @@ pub(crate) unsafe fn described(table: &InterfaceTable) -> Result<Description, Co
             name,
         };
         numbers_differ(&description)?;
+        // As in other languages: the order in which an author wrote them does not count.
+        description.functions.sort_by_key(|function| function.number);
+        description.data.sort_by_key(|item| item.number);
         Ok(description)
     }
 }

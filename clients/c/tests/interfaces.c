@@ -45,6 +45,18 @@ static rohrpost_code hash_of(rohrpost_type type) {
     return rohrpost_interface_hash(&with_data, &hash);
 }
 
+static void the_order_of_the_tables_does_not_count(void) {
+    const rohrpost_function functions[] = {FUNCTIONS[1], FUNCTIONS[0]};
+    const rohrpost_data data[] = {DATA[1], DATA[0]};
+    rohrpost_interface turned = ZOO;
+    turned.functions = functions;
+    turned.data = data;
+    uint32_t hashes[2];
+    DONE(rohrpost_interface_hash(&ZOO, &hashes[0]));
+    DONE(rohrpost_interface_hash(&turned, &hashes[1]));
+    CHECK(hashes[0] == hashes[1]);
+}
+
 static void tables_that_cannot_be_are_codes(void) {
     uint32_t hash;
     GIVES(ROHRPOST_NULL_POINTER, rohrpost_interface_hash(NULL, &hash));
@@ -146,6 +158,7 @@ int main(void) {
         printf("%08x\n", (unsigned)hash);
     }
     bytes_and_tables_are_one_interface();
+    the_order_of_the_tables_does_not_count();
     tables_that_cannot_be_are_codes();
     outside_of_a_module_all_is_refused();
     puts("all is well");
