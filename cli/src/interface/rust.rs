@@ -5,7 +5,7 @@ use super::blueprint::{Blueprint, Body, Inside, Layout, NamedType, Operation, Pu
 use super::names::{Scope, camel, is_plain, last, snake};
 use super::refusal::{Refusal, RefusedFor};
 use super::standard;
-use super::texts::{one_line, wrapped};
+use super::texts::{in_rust_doc, one_line, wrapped};
 use rohrpost::schema::{DataKind, Field, Type, Value, decode};
 use std::collections::BTreeSet;
 
@@ -166,7 +166,7 @@ impl<'a> RustCode<'a> {
 
     fn definition(&self, named: &NamedType<'_>, place: usize) -> Result<String, Refusal> {
         let ident = &self.paths[place];
-        let mut code = wrapped("/// ", &one_line(named.text));
+        let mut code = wrapped("/// ", &in_rust_doc(named.text));
         let silent = |parts: &[TypedField<'_>]| parts.iter().any(|part| one_line(&part.field.text).is_empty());
         let is_silent = match &named.body {
             Body::Struct(inside) => code.is_empty() || silent(inside.parts()),
@@ -194,7 +194,7 @@ impl<'a> RustCode<'a> {
                 for variant in variants {
                     let given = scope.give(&camel(variant.name, "Variant"), "");
                     let (ident, rename) = renamed(&given, variant.name);
-                    code += &wrapped("    /// ", &one_line(variant.text));
+                    code += &wrapped("    /// ", &in_rust_doc(variant.text));
                     code += &rename.map_or(String::new(), |rename| format!("    {rename}"));
                     let place = format!("{}.{}", named.name, variant.name);
                     code += &format!("    {ident}{},\n", self.inside(&variant.inside, &place, "", "    ")?);
@@ -226,7 +226,7 @@ impl<'a> RustCode<'a> {
                 for part in parts {
                     let name = part.field.name.as_str();
                     let (ident, rename) = renamed(&scope.give(&snake(name, "field"), "_"), name);
-                    code += &wrapped(&format!("{indent}    /// "), &one_line(&part.field.text));
+                    code += &wrapped(&format!("{indent}    /// "), &in_rust_doc(&part.field.text));
                     code += &rename.map_or(String::new(), |rename| format!("{indent}    {rename}"));
                     code += &said(part.field).map_or(String::new(), |said| format!("{indent}    {said}\n"));
                     let place = format!("{place}.{name}");
@@ -239,7 +239,7 @@ impl<'a> RustCode<'a> {
 
     fn interface(&self) -> Result<String, Refusal> {
         let Blueprint { name, class, text, operations, published, .. } = self.blueprint;
-        let mut code = wrapped("/// ", &one_line(text));
+        let mut code = wrapped("/// ", &in_rust_doc(text));
         let silent =
             operations.iter().map(|it| &it.function.text).chain(published.iter().map(|it| &it.part.field.text));
         if code.is_empty() || silent.clone().any(|text| one_line(text).is_empty()) {
@@ -269,7 +269,7 @@ impl<'a> RustCode<'a> {
         if operation.arguments.len() > 8 {
             return Err(cannot(name, "more than eight arguments", "put them into a struct"));
         }
-        let mut code = wrapped("    /// ", &one_line(&function.text));
+        let mut code = wrapped("    /// ", &in_rust_doc(&function.text));
         let idempotent = if function.idempotent { ", idempotent" } else { "" };
         code += &format!("    #[command({}{idempotent})]\n", function.number);
         let (mut short, mut long) = (String::from("&mut self"), String::from("        &mut self,\n"));
@@ -308,7 +308,7 @@ impl<'a> RustCode<'a> {
         if published.number == 0 {
             return Err(RefusedFor::Number(0, "data in Rust", "1 to 16384").at(name));
         }
-        let mut code = wrapped("    /// ", &one_line(&field.text));
+        let mut code = wrapped("    /// ", &in_rust_doc(&field.text));
         let word = match published.kind {
             DataKind::Data => "data",
             DataKind::Stream => "stream",

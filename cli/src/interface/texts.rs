@@ -101,7 +101,20 @@ pub(super) fn c_comment(indent: &str, text: &str) -> String {
     format!("{indent}/** {} */\n", lines.trim_end())
 }
 
-/// A text in a docstring of Python.
+/// A text in a docstring of Python: it does not end, and has no line that `doctest` would run.
 pub(super) fn in_docstring(text: &str) -> String {
-    one_line(text).replace('\\', "\\\\").replace('"', "\\\"")
+    one_line(text).replace('\\', "\\\\").replace('"', "\\\"").replace(">>>", ">> >")
+}
+
+/// A text in a comment that rustdoc reads: no fence, behind which would stand code that tests run, and no HTML.
+pub(super) fn in_rust_doc(text: &str) -> String {
+    let line = one_line(text).replace("```", "`` `").replace("~~~", "~~ ~");
+    let mut broken = String::with_capacity(line.len());
+    for (at, c) in line.char_indices() {
+        broken.push(c);
+        if c == '<' && line[at + 1..].starts_with(|next: char| next.is_ascii_alphabetic() || "/!?".contains(next)) {
+            broken.push(' ');
+        }
+    }
+    broken
 }

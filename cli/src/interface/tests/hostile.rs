@@ -2,6 +2,7 @@
 //! than it should.
 
 use super::super::blueprint::{Blueprint, DEPTH_MAX, NAME_BYTES_MAX};
+use super::super::python::OF_MODULES;
 use super::{Language, generated};
 use rohrpost::schema::{DataItem, DataKind, Description, Field, Function, Members, Named, Type};
 use std::process::{Command, Stdio};
@@ -130,7 +131,10 @@ fn thousands_of_one_name_have_numbers() {
 
 /// Ends comments, literals and lines of each language, and goes on with what none compiles.
 const TEXT: &str = "*/ \"\"\" ??/\n#error FORGED\n'''\\\" compile_error!(\"FORGED\"); raise FORGED \u{202e}\u{2028}\\\
-    \r\n#error FORGED \\";
+    \r\n#error FORGED \\ ```\n\
+    compile_error!(\"FORGED_behind_a_fence_in_a_word_that_is_so_long_that_it_has_a_line_of_its_own_in_every_language\")\n\
+    ~~~ <script>FORGED</script> \
+    the_next_is_behind_a_word_that_is_so_long_that_it_has_a_line_of_its_own_in_every_language_and_more >>> FORGED()";
 /// The same without what no name may have.
 const NAME: &str = "*/ \"\"\" ??/ FORGED'''\\\" compile_error!(FORGED); raise FORGED */ \\";
 
@@ -193,6 +197,10 @@ fn texts_and_names_end_no_comment_and_no_literal() {
         let place = line.trim_start();
         assert!(place.starts_with("//") || literal.iter().any(|it| place.contains(it)), "{line}");
     }
+    assert!(
+        !rust.lines().any(|line| line.contains("///") && ["```", "~~~", "<script"].iter().any(|it| line.contains(it)))
+    );
+    assert!(!python.lines().any(|line| line.trim_start().starts_with(">>>")), "no line is run by doctest");
     accepts("rustfmt", &["--edition", "2024", "--emit", "stdout"], &rust);
     let classes = python.lines().filter(|line| line.starts_with("class ")).map(|line| line.split(['(', ':']).next());
     let classes: Vec<_> = classes.collect();
@@ -202,4 +210,16 @@ fn texts_and_names_end_no_comment_and_no_literal() {
     accepts("python3", &["-c", tree], &python);
     accepts("gcc", &["-std=c11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-x", "c", "-"], &c);
     accepts("g++", &["-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-x", "c++", "-"], &c);
+}
+
+#[test]
+fn generated_functions_hide_none_that_each_module_in_python_has() {
+    let source = include_str!("../../../../clients/python/src/rohrpost/interface.py");
+    let class = source.split("\nclass Module:\n").nth(1).unwrap().split("\n\n\ndef ").next().unwrap();
+    let functions = class.lines().filter_map(|line| line.strip_prefix("    def ")?.split('(').next());
+    let public: Vec<&str> = functions.filter(|name| !name.starts_with('_')).collect();
+    assert!(public.contains(&"publish") && public.len() > 8, "{public:?}");
+    for name in public {
+        assert!(OF_MODULES.contains(&format!(" {name} ")), "`{name}` of rp.Module is missing in OF_MODULES");
+    }
 }
