@@ -27,6 +27,7 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         "echo" => &["probe.0", "beat"],
         "send" => &["probe.0", "count", "1", "--count", "1"],
         "param" | "stream" => &["list"],
+        "interface" => &["export", "probe.0"],
         "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run"
         | "keys" | "record" | "replay" => {
             return None;
