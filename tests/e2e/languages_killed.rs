@@ -43,7 +43,7 @@ fn modules(place: &Place) -> Vec<String> {
     let reads = format!("calls = [\"camera.0\"]\n{RESTART}");
     vec![
         CLASSES.into(),
-        "[classes.seer]\nid = 107\n[scheduling]\nreal-time-from = 256\n".into(),
+        "[classes.seer]\nid = 107\n".into(),
         OUTPUT.into(),
         entry("camera.0", &quoted(&example(place, "camera")), &format!("{RESTART}\n{stream}")),
         entry("viewer.0", &quoted(&example(place, "viewer")), &reads),
