@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pathlib
 import random
@@ -11,13 +12,15 @@ from typing import Any
 
 import rohrpost as rp
 from rohrpost.annotations import type_of
-from rohrpost.schema import WalkError, encode, type_from_bytes
+from rohrpost.schema import WalkError, encode, to_json, type_from_bytes
 from rohrpost.schema.decode import Decoder, decode
-from rohrpost.schema.readers import UNREAD, known_reader, reader_of
+from rohrpost.schema.encode import _Encoder
+from rohrpost.schema.readers import READERS, UNREAD, reader_of
 from rohrpost.schema.tree import (
     BOOL, BYTES, CHAR, EMPTY_MAX, F32, F64, TEXT, U8, U32, UNIT, Array, Enum, Field, List, Map, Named, Option, Plain,
     Struct, Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
+from rohrpost.schema.writers import writer_of
 
 from .generated import zoo
 from .generated.gripper import Grip, GripError
@@ -144,6 +147,30 @@ def types(chance: random.Random) -> Iterator[Type]:
         yield any_type(chance, chance.randrange(1, 4))
 
 
+def written(type: Type, value: Any) -> bytes:
+    encoder = _Encoder()
+    encoder.value(type, value)
+    return bytes(encoder.out)
+
+
+def odd(chance: random.Random, value: Any) -> Any:
+    """The same, with something in it that has another form, or does not fit."""
+    if isinstance(value, (list, tuple)) and value and chance.random() < 0.8:
+        at = chance.randrange(len(value))
+        changed = [*value[:at], odd(chance, value[at]), *value[at + 1 :]]
+        return changed if chance.random() < 0.5 else tuple(changed)
+    if isinstance(value, dict) and value and chance.random() < 0.8:
+        name = chance.choice(list(value))
+        return value | {name: odd(chance, value[name])}
+    if isinstance(value, (Variant, rp.Choice)) and chance.random() < 0.8:
+        return chance.choice((Variant(value.name, odd(chance, value.value)), {value.name: value.value}, value.name))
+    if isinstance(value, int) and chance.random() < 0.5:
+        return chance.choice((str(value), hex(value), value + 256, -value, float(value % 1000)))
+    choices: list[Any] = [None, True, 0, 1, 255, 256, -1, 1.0, 1e300, "", "a", "V0", b"a", [], [1], {}, {"f0": 1}]
+    choices += ["\ud800", {1: 2}, 1 << 64, Variant("Some"), rp.State.On, rp.Pose(), Variant("V0", 1), object]
+    return chance.choice(choices)
+
+
 class Readers(unittest.TestCase):
     def test_both_read_the_same_and_say_the_same_of_what_is_damaged(self) -> None:
         chance = random.Random(3)
@@ -173,16 +200,54 @@ class Readers(unittest.TestCase):
             yield data[:at] + bytes([chance.choice((0, 1, 0x7F, 0x80, 0xFF, chance.randrange(256)))]) + data[at + 1 :]
             yield data[:at] + b"\xff" * chance.randrange(12) + data[at:]
 
+    def test_both_write_the_same_and_say_the_same_of_what_does_not_fit(self) -> None:
+        chance = random.Random(4)
+        made = other = refused = 0
+        for type in types(chance):
+            write = writer_of(type)
+            for _ in range(4):
+                value = any_value(chance, type)
+                data = written(type, value)
+                if write is not None:
+                    out = bytearray(b"before")
+                    write(out, value)
+                    made += 1
+                    self.assertEqual(out, b"before" + data)
+                for _ in range(2):
+                    self.assertEqual(encode(type, value), data)
+                self.assertEqual(encode(type, to_json(type, value)), data)
+                for _ in range(12):
+                    strange = odd(chance, value)
+                    said = outcome(lambda: written(type, strange))
+                    refused += "WalkError" in said
+                    other += "WalkError" not in said
+                    self.assertEqual(outcome(lambda: encode(type, strange)), said, f"{type} of {strange}")
+        self.assertTrue(min(made, other, refused) > 800, f"{made} written, {other} of other forms, {refused} refused")
+
+    def test_a_struct_is_written_of_any_class_that_has_its_fields(self) -> None:
+        pose = type_of(rp.Pose)
+        classes = [dataclasses.make_dataclass(f"Own{at}", ["heading_rad", "x_m", "y_m"]) for at in range(20)]
+        for made in [*classes, *classes]:
+            self.assertEqual(encode(pose, made(3.0, 1.0, 2.0)), encode(pose, rp.Pose(1.0, 2.0, 3.0)))
+        for less in (["x_m"], ["x_m", "y_m", "heading_rad", "z_m"]):
+            with self.assertRaises(WalkError):
+                encode(pose, dataclasses.make_dataclass("Other", less)(*map(float, range(len(less)))))
+
     def test_a_type_that_may_go_beyond_a_limit_has_no_reader(self) -> None:
-        nested: Type = U8
-        for _ in range(127):
+        nested = Tuple((U8,))
+        for _ in range(126):
             nested = Tuple((nested,))
         wide: Type = UNIT
         for _ in range(17):
             wide = Tuple((wide, wide))
         self.assertIsNotNone(reader_of(nested))
-        for type in (Tuple((nested,)), wide, List(UNIT), Map(U8, UNIT), Array(EMPTY_MAX, UNIT), List(Option(UNIT))):
+        shared = nested.elements[0]
+        twice = Tuple((shared, Tuple((shared,))))
+        for type in (Tuple((nested,)), twice, wide, List(UNIT), Map(U8, UNIT), Array(EMPTY_MAX, UNIT), List(Option(UNIT))):
             self.assertIsNone(reader_of(type))
+        self.assertIsNotNone(writer_of(nested))
+        for type in (Tuple((nested,)), twice):
+            self.assertIsNone(writer_of(type))
         self.assertIsNotNone(reader_of(Array(EMPTY_MAX - 1, UNIT)))
         read = reader_of(Array((1 << 32) - 1, F64))
         assert read is not None
@@ -194,13 +259,13 @@ class Readers(unittest.TestCase):
     def test_a_reader_is_made_when_a_type_is_read_again(self) -> None:
         type = Tuple((U32, TEXT))
         decode(type, b"\1\1a")
-        self.assertIsNone(known_reader(type))
+        self.assertIsNone(READERS.of(type))
         for wrong in (b"\1\1", b"\1\1\xff", b"\1\1ab"):
             with self.assertRaises(WalkError):
                 decode(type, wrong)
-        self.assertIsNone(known_reader(type))
+        self.assertIsNone(READERS.of(type))
         decode(type, b"\1\1a")
-        self.assertIsNotNone(known_reader(type))
+        self.assertIsNotNone(READERS.of(type))
         self.assertEqual(type, Tuple((U32, TEXT)), "it is the same type still")
 
     def test_classes_are_made_as_their_authors_say(self) -> None:

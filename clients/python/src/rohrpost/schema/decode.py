@@ -18,7 +18,7 @@ import struct
 from typing import Any
 
 from .errors import WalkError, counted
-from .readers import UNREAD, Lend, known_reader, prepare
+from .readers import READERS, UNREAD, Lend
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
@@ -28,7 +28,7 @@ from .tree import (
 def decode(type: Type, data: bytes | memoryview, lend: Lend = None) -> Any:
     """The value that all of ``data`` holds. ``lend``: what ``bytes`` in it become, by where they begin and end; else
     they are copied. Raises :class:`WalkError`, with the path to where it showed."""
-    read = known_reader(type)
+    read = READERS.of(type)
     if read is not None:
         try:
             value, end = read(data, 0, lend)
@@ -41,7 +41,7 @@ def decode(type: Type, data: bytes | memoryview, lend: Lend = None) -> Any:
     left = len(data) - decoder.at
     if left:
         raise WalkError(f"{counted(left, 'byte')} too many")
-    prepare(type)
+    READERS.used(type)
     return value
 
 

@@ -17,16 +17,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Optional
 
+from .kept import Kept
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
-    Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
+    Tuple, Type, Variant, float_of, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
 
 Lend = Optional[Callable[[int, int], Any]]
 """What ``bytes`` from here to there become, if they are a value; none: they are copied."""
 Reader = Callable[[Any, int, Lend], tuple[Any, int]]
 """From bytes, and where a value begins in them: the value, and where it ends."""
-_SEEN, _READER = "_was_read", "_reader"
 
 
 class Unread(Exception):
@@ -37,21 +37,6 @@ UNREAD = (Unread, IndexError, struct.error, UnicodeDecodeError)
 """What a reader raises of bytes that do not fit."""
 
 
-def prepare(type: Type) -> None:
-    """A value of it was read. By the second time it gets a reader: types that are made for one value need none."""
-    its = type.__dict__
-    if _SEEN not in its:
-        its[_SEEN] = True
-    elif _READER not in its:
-        its[_READER] = reader_of(type)
-
-
-def known_reader(type: Type) -> Reader | None:
-    """Its reader, if it has one."""
-    found: Reader | None = type.__dict__.get(_READER)
-    return found
-
-
 def reader_of(type: Type) -> Reader | None:
     """Makes a reader of a type; none: it nests too deep, or may have too many values that take no bytes."""
     try:
@@ -59,6 +44,9 @@ def reader_of(type: Type) -> Reader | None:
     except Unread:
         return None
     return made.read if made.empties <= EMPTY_MAX else None
+
+
+READERS = Kept("reader", reader_of)
 
 
 @dataclass
@@ -100,7 +88,7 @@ class _Maker:
         if isinstance(type, Array):
             inner = self.made(type.element, depth)
             empties = min(type.length * inner.empties, EMPTY_MAX + 1)
-            read = _many(inner.read, _float(type.element), type.length)
+            read = _many(inner.read, float_of(type.element), type.length)
             return _Made(read, empties, inner.is_empty or not type.length, inner.depth + 1)
         if isinstance(type, Tuple):
             inners = [self.made(it, depth) for it in type.elements]
@@ -115,7 +103,7 @@ class _Maker:
         inner = self.made(type.element, depth)
         if inner.empties:
             raise Unread
-        return _around(_many(inner.read, _float(type.element), None), inner)
+        return _around(_many(inner.read, float_of(type.element), None), inner)
 
     def _map(self, type: Map, depth: int) -> _Made:
         # A pair is one more that nests, where the value is a list of them.
@@ -311,12 +299,6 @@ def _option(inner: Reader, is_marked: bool) -> Reader:
         return Variant("Some", value) if is_marked else value, at
 
     return read
-
-
-def _float(type: Type) -> str:
-    """As :mod:`struct` calls it; empty: it is none."""
-    type = unwrapped(type)
-    return "f" if type == F32 else "d" if type == F64 else ""
 
 
 def _claimed(data: Any, at: int) -> tuple[int, int]:

@@ -174,6 +174,12 @@ def is_byte(type: Type) -> bool:
     return unwrapped(type) == U8
 
 
+def float_of(type: Type) -> str:
+    """As :mod:`struct` calls a number with a point; empty: it is none."""
+    type = unwrapped(type)
+    return "f" if type == F32 else "d" if type == F64 else ""
+
+
 def is_empty(type: Type) -> bool:
     """Whether no value of it takes any byte."""
     if isinstance(type, Array):
