@@ -250,7 +250,7 @@ class Session:
         if gone is not None:
             self.closed(now_ns, gone)
             return Step.CLOSE, 0
-        self._speak(now_ns)
+        self.speak(now_ns)
         if self._out and not self._is_blocked:
             return Step.WRITE, 0
         return Step.WAIT, self._look_ns
@@ -268,7 +268,8 @@ class Session:
         silent = self._asking.is_silent(now_ns, self._heard_ns, self._moved_ns, since is not None)
         return "nothing came from the TCP router for too long" if silent else None
 
-    def _speak(self, now_ns: int) -> None:
+    def speak(self, now_ns: int) -> None:
+        """Makes ready what may leave now; :meth:`poll` does, too."""
         if self._state is not State.MEMBER:
             return
         if self._asking.is_due(now_ns):
