@@ -97,6 +97,10 @@ class Client(Shell):
         return self._describe(self._core.own, self.name(name), timeout_s)
 
     def _describe(self, endpoint: Endpoint, to: Name, timeout_s: float) -> Description:
+        self._check()
+        known = self._core.known(to)
+        if known is not None:
+            return known
         box: list[Any] = []
         done = threading.Event()
 
@@ -107,9 +111,8 @@ class Client(Shell):
         with self._locked():
             self._core.now_ns = passed_ns()
             self._core.describe(endpoint, to, int(timeout_s * 1e9), take)
-        if not box:
-            self._wake()
-            done.wait()
+        self._wake()
+        done.wait()
         if isinstance(box[0], CallError):
             raise box[0]
         found: Description = box[0]
@@ -262,7 +265,8 @@ class Client(Shell):
             return False
         self._core.session.speak(now_ns)
         try:
-            self._write(line)
+            if self._core.session.has_ready or line.transport.pending():
+                self._write(line)
         except (OSError, NoConnection) as error:
             line.broken = error
         return line.broken is None and not line.transport.pending()

@@ -214,6 +214,11 @@ class Session:
         self._register_ns, self._holds = now_ns, False
         self._out = bytearray()
 
+    @property
+    def has_ready(self) -> bool:
+        """Whether there are bytes to be written."""
+        return bool(self._out)
+
     def ready(self) -> bytes:
         """Bytes to be written."""
         return bytes(self._out)
@@ -348,8 +353,8 @@ class Session:
         session = self.clock.session(now_ns)
         is_old = session is not None and carried.published and sum(session) - carried.published > AGE_NS_MAX
         if not is_old:
-            package = carried.package
-            self._deliver(now_ns, replace(package, head=package.head.capped()))
+            package, head = carried.package, carried.package.head.capped()
+            self._deliver(now_ns, package if head is package.head else replace(package, head=head))
 
     def _say(self, is_up: bool, words: str) -> None:
         if words != self._said:
