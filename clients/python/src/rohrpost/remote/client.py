@@ -1,7 +1,7 @@
 """The synchronous client: a shell around the core with a socket, a thread and a lock.
 
-One thread reads and writes; each hosted module has a thread of its own, which runs its functions one after the other.
-All methods may be called from any thread.
+One thread reads and writes, or while calls wait one of those (:mod:`.line`); each hosted module has a thread of its own,
+which runs its functions one after the other. All methods may be called from any thread.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import os
 import socket
 import ssl
 import threading
-from collections.abc import Iterator
 from typing import Any
 
 from ..common import Status
@@ -47,6 +46,7 @@ class Client(Shell):
         super().__init__(server, own, settings, context)
         self._mutex = threading.RLock()
         self._lock = threading.Condition(self._mutex)
+        self._for_others = _Locked(self)
         self._hosts: list[ModuleHost] = []
         self._ears = Ears()
         self._rests_until_ns = 0
@@ -81,14 +81,9 @@ class Client(Shell):
             if not self._lock.wait_for(lambda: self._core.session.is_up or self._is_closed, timeout_s):
                 raise not_connected(self._core)
 
-    @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
-        """The lock, for what others ask. After a fork a thread that is not there any more may hold it: so the process
-        is asked first."""
-        self._check()
-        with self._lock:
-            self._check()
-            yield
+    def _locked(self) -> _Locked:
+        """The lock, for what others ask."""
+        return self._for_others
 
     # Calls.
 
@@ -380,3 +375,22 @@ class Client(Shell):
             raise line.broken
         self._write(line)
         self._ears.watch()
+
+
+class _Locked:
+    """A client's lock. After a fork a thread that is not there any more may hold it: so the process is asked first."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+
+    def __enter__(self) -> None:
+        self._client._check()
+        self._client._mutex.acquire()
+        try:
+            self._client._check()
+        except BaseException:
+            self._client._mutex.release()
+            raise
+
+    def __exit__(self, *_: object) -> None:
+        self._client._mutex.release()
