@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import json
 import pathlib
+import pickle
 import random
 import unittest
 from collections.abc import Callable, Iterator
@@ -268,6 +270,9 @@ class Readers(unittest.TestCase):
         decode(type, b"\1\1a")
         self.assertIsNotNone(READERS.of(type))
         self.assertEqual(type, Tuple((U32, TEXT)), "it is the same type still")
+        for copied in (pickle.loads(pickle.dumps(type)), copy.deepcopy(type)):
+            self.assertEqual(copied, type)
+            self.assertIsNone(READERS.of(copied))
 
     def test_classes_are_made_as_their_authors_say(self) -> None:
         @rp.data

@@ -130,13 +130,13 @@ class Client(Shell):
                     now_ns, to, prepared.number, prepared.interface, prepared.arguments, int(timeout_s * 1e9),
                     waiting.over,
                 )  # fmt: skip
-                line = self._ears.lend(waiting)
+                line = self._ears.lend(waiting) if self._core.session.is_up else None
                 is_soon = not self._pushed(now_ns) or call.repeat_ns < self._rests_until_ns
             if is_soon:
                 self._wake()
             while line is not None and not call.is_done:
                 self._ears.listen(line)
-                line = self._heard(line)
+                line = self._heard(line, call)
             waiting.wait()
         finally:
             with self._mutex:
@@ -266,24 +266,25 @@ class Client(Shell):
             line.broken = error
         return line.broken is None and not line.transport.pending()
 
-    def _heard(self, line: Line) -> Line | None:
+    def _heard(self, line: Line, call: Call) -> Line | None:
         """Reads as a thread that listens; none: there is nothing to listen to any more."""
         with self._mutex:
             if line is not self._ears.line or line.broken is not None:
                 return None
+            is_all, before = False, self._core.session.heard
             try:
                 self._read(line)
-                if self._pushed(passed_ns()):
-                    return line
+                is_all = self._pushed(passed_ns())
             except (OSError, NoConnection) as error:
                 line.broken = error
             except BaseException:
                 line.broken = NoConnection("a thread that read was interrupted")
                 raise
             finally:
-                if line.broken is not None or line.transport.pending():
+                if not (is_all and call.is_done and self._core.session.heard == before + 1):
+                    # There was more than the answer: the core is to be asked what follows from it.
                     self._wake()
-        return None if line.broken is not None else line
+            return line if line.broken is None and self._core.session.is_up else None
 
     def _write(self, line: Line) -> None:
         pending, session = line.transport.pending(), self._core.session

@@ -25,10 +25,11 @@ _CAN_LEND = hasattr(select, "epoll")
 
 
 class Line:
-    """A connection. ``broken``: why its bytes are not read any more; the client's own thread ends it then."""
+    """A connection. ``number``: of its socket; ``broken``: why its bytes are not read any more; the client's own thread ends it then."""
 
     def __init__(self, stream: socket.socket, transport: Transport) -> None:
         self.stream = stream
+        self.number = stream.fileno()
         self.transport = transport
         self.broken: OSError | NoConnection | None = None
         self.watched = 0
@@ -120,8 +121,8 @@ class Ears:
     def listen(self, line: Line) -> None:
         """Waits until something comes, or for :meth:`kick`."""
         poll = select.poll()
-        if line is self.line:
-            poll.register(line.stream, select.POLLIN)
+        # By its number: it may have been dropped just now, and then the bell rings, too.
+        poll.register(line.number, select.POLLIN)
         poll.register(self._kick.rings, select.POLLIN)
         for ready, _ in poll.poll():
             if ready == self._kick.rings.fileno():

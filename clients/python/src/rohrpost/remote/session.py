@@ -155,6 +155,8 @@ class Session:
         self._attempt = 0
         self._backoff = Backoff(settings.incarnation)
         self._splitter = Splitter()
+        self.heard = 0
+        """Messages that came so far."""
         self._waiting = _Waiting(settings.quota_bytes)
         self._out = bytearray()
         self._taken = 0
@@ -307,6 +309,7 @@ class Session:
                 self._over(str(bad))
 
     def _handle(self, now_ns: int, message: frames.Message) -> None:
+        self.heard += 1
         if isinstance(message, Refused):
             if message.is_hopeless:
                 self._backoff.hopeless()

@@ -20,8 +20,15 @@ NAMES = (
 """Types that are their tag alone, by their tag."""
 
 
+class _Kept:
+    """What a type is kept with beside its fields (:mod:`.kept`) stays behind where it is copied to."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if not name.startswith("_")}
+
+
 @dataclass(frozen=True)
-class Plain:
+class Plain(_Kept):
     """A type that is its tag alone."""
 
     tag: int
@@ -45,14 +52,14 @@ UNIT, BOOL, U8, U16, U32, U64, U128, I8, I16, I32, I64, I128, F32, F64, CHAR, TE
 
 
 @dataclass(frozen=True)
-class Option:
+class Option(_Kept):
     """A value or none."""
 
     inner: Type
 
 
 @dataclass(frozen=True)
-class List:
+class List(_Kept):
     """Any number of one type."""
 
     element: Type
@@ -64,7 +71,7 @@ class List:
 
 
 @dataclass(frozen=True)
-class Array:
+class Array(_Kept):
     """A fixed number of one type."""
 
     length: int
@@ -72,7 +79,7 @@ class Array:
 
 
 @dataclass(frozen=True)
-class Map:
+class Map(_Kept):
     """Keys, and what belongs to each."""
 
     key: Type
@@ -85,7 +92,7 @@ class Map:
 
 
 @dataclass(frozen=True)
-class Tuple:
+class Tuple(_Kept):
     """One after the other."""
 
     elements: tuple[Type, ...]
@@ -118,7 +125,7 @@ class Named:
 
 
 @dataclass(frozen=True)
-class Struct:
+class Struct(_Kept):
     """A struct. ``python``: the class of its values; none: they are dicts."""
 
     named: Named
@@ -126,7 +133,7 @@ class Struct:
 
 
 @dataclass(frozen=True)
-class Enum:
+class Enum(_Kept):
     """An enum. ``python``: the class of its values; none: they are :class:`Variant`."""
 
     name: str
