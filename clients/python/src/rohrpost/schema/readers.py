@@ -19,8 +19,8 @@ from typing import Any, Optional
 
 from .kept import Kept
 from .tree import (
-    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
-    Tuple, Type, Variant, float_of, is_byte, is_nullable, unwrapped,
+    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Members, Named, Option, Plain,
+    Struct, Tuple, Type, Variant, float_of, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
 
 Lend = Optional[Callable[[int, int], Any]]
@@ -51,12 +51,19 @@ READERS = Kept("reader", reader_of)
 
 @dataclass
 class _Made:
-    """A reader. ``empties``: values that take no bytes in one that is read, at most."""
+    """A reader. ``empties``: values that take no bytes in one that is read, at most. ``bits``: of whole numbers without
+    a sign, which a struct reads itself: that is quicker than to call."""
 
     read: Reader
     empties: int = 0
     is_empty: bool = False
     depth: int = 1
+    bits: int = 0
+
+    @property
+    def part(self) -> Reader | int:
+        """As a part of several."""
+        return self.bits or self.read
 
 
 class _Maker:
@@ -79,7 +86,8 @@ class _Maker:
 
     def _of(self, type: Type, depth: int) -> _Made:
         if isinstance(type, Plain):
-            return _Made(_plain(type), 0, type.tag == 0)
+            signed, bits = type.integer or (True, 0)
+            return _Made(_plain(type), 0, type.tag == 0, 1, 0 if signed or bits == 8 else bits)
         if isinstance(type, Option):
             inner = self.made(type.inner, depth)
             return _around(_option(inner.read, is_nullable(type.inner)), inner)
@@ -92,7 +100,7 @@ class _Maker:
             return _Made(read, empties, inner.is_empty or not type.length, inner.depth + 1)
         if isinstance(type, Tuple):
             inners = [self.made(it, depth) for it in type.elements]
-            return _together(_several([it.read for it in inners], _as_tuple), inners)
+            return _together(_several([it.part for it in inners], _as_tuple), inners)
         if isinstance(type, Map):
             return self._map(type, depth)
         if isinstance(type, Struct):
@@ -126,18 +134,23 @@ class _Maker:
         if named.kind == 0:
             return _Made(_nothing if python is None else _made_of_nothing(python), 0, True)
         make = _payload(named) if python is None else _called(python, names)
-        return _together(_several([it.read for it in inners], make), inners)
+        return _together(_several([it.part for it in inners], make), inners)
 
     def _enum(self, type: Enum, depth: int) -> _Made:
-        variants: list[tuple[str, Reader | None]] = []
+        variants: list[_Chosen] = []
+        python = Variant if type.python is None else type.python
+        # What nobody can change is the same each time.
+        is_fixed = type.python is None or isinstance(type.python, Members)
         inners: list[_Made] = []
         for variant in type.variants:
             its = self._members(variant, depth) if variant.kind else []
             inners += its
-            reads = [it.read for it in its]
-            several = _several(reads, _payload(variant)) if variant.kind > 1 else None
-            variants.append((variant.name, reads[0] if variant.kind == 1 else several))
-        made = _together(_enum(variants, Variant if type.python is None else type.python), inners)
+            read = its[0].read if variant.kind == 1 else None
+            if variant.kind > 1:
+                read = _several([it.part for it in its], _payload(variant))
+            fixed = python(variant.name, None) if is_fixed and not variant.kind else None
+            variants.append((fixed, variant.name, read))
+        made = _together(_enum(variants, python), inners)
         made.is_empty = False
         return made
 
@@ -189,8 +202,8 @@ def _made_of_nothing(python: Any) -> Reader:
 
 
 def _long(data: Any, at: int, bits: int) -> tuple[int, int]:
-    number = 0
-    for shift in range(0, bits, 7):
+    number = shift = 0
+    while shift < bits:
         byte = data[at]
         at += 1
         number |= (byte & 0x7F) << shift
@@ -198,6 +211,7 @@ def _long(data: Any, at: int, bits: int) -> tuple[int, int]:
             if number >> bits:
                 break
             return number, at
+        shift += 7
     raise Unread
 
 
@@ -260,7 +274,10 @@ def _span(data: Any, at: int) -> tuple[int, int]:
 
 
 def _octets(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    at, end = _span(data, at)
+    length, at = _long(data, at, 64)
+    end = at + length
+    if end > len(data):
+        raise Unread
     return bytes(data[at:end]) if lend is None else lend(at, end), end
 
 
@@ -332,11 +349,22 @@ def _many(inner: Reader, as_float: str, fixed: int | None) -> Reader:
     return read
 
 
-def _several(inners: list[Reader], make: Callable[..., Any]) -> Reader:
+def _several(inners: list[Reader | int], make: Callable[..., Any]) -> Reader:
     def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
         values = []
         for inner in inners:
-            value, at = inner(data, at, lend)
+            if not isinstance(inner, int):
+                value, at = inner(data, at, lend)
+            else:
+                value = data[at]
+                if value < 0x80:
+                    at += 1
+                else:
+                    second = data[at + 1]
+                    if second < 0x80:
+                        value, at = value & 0x7F | second << 7, at + 2
+                    else:
+                        value, at = _long(data, at, inner)
             values.append(value)
         return make(*values), at
 
@@ -356,16 +384,20 @@ def _map(key: Reader, value: Reader, has_words: bool) -> Reader:
     return read
 
 
-def _enum(variants: list[tuple[str, Reader | None]], make: Callable[[str, Any], Any]) -> Reader:
+_Chosen = tuple[Any, str, Optional[Reader]]
+"""A variant: its value, if that is always the same; its name; and what reads its payload, if there is one."""
+
+
+def _enum(variants: list[_Chosen], make: Callable[[str, Any], Any]) -> Reader:
     def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
         index = data[at]
         if index < 0x80:
             at += 1
         else:
             index, at = _long(data, at, 32)
-        name, inner = variants[index]
+        fixed, name, inner = variants[index]
         if inner is None:
-            return make(name, None), at
+            return make(name, None) if fixed is None else fixed, at
         value, at = inner(data, at, lend)
         return make(name, value), at
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Union
@@ -130,6 +131,16 @@ class Struct(_Kept):
 
     named: Named
     python: Any = field(default=None, compare=False, repr=False)
+
+
+class Members:
+    """``python`` of an enum that is an ``enum.Enum``: its members, which nobody changes, by name."""
+
+    def __init__(self, by_name: Mapping[str, Any]) -> None:
+        self._by_name = dict(by_name)
+
+    def __call__(self, chosen: str, _: Any) -> Any:
+        return self._by_name[chosen]
 
 
 @dataclass(frozen=True)
