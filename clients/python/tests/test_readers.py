@@ -262,17 +262,17 @@ class Readers(unittest.TestCase):
     def test_a_reader_is_made_when_a_type_is_read_again(self) -> None:
         type = Tuple((U32, TEXT))
         decode(type, b"\1\1a")
-        self.assertIsNone(READERS.of(type))
+        self.assertIsNone(type.__dict__.get(READERS.name))
         for wrong in (b"\1\1", b"\1\1\xff", b"\1\1ab"):
             with self.assertRaises(WalkError):
                 decode(type, wrong)
-        self.assertIsNone(READERS.of(type))
+        self.assertIsNone(type.__dict__.get(READERS.name))
         decode(type, b"\1\1a")
-        self.assertIsNotNone(READERS.of(type))
+        self.assertIsNotNone(type.__dict__.get(READERS.name))
         self.assertEqual(type, Tuple((U32, TEXT)), "it is the same type still")
         for copied in (pickle.loads(pickle.dumps(type)), copy.deepcopy(type)):
             self.assertEqual(copied, type)
-            self.assertIsNone(READERS.of(copied))
+            self.assertIsNone(copied.__dict__.get(READERS.name))
 
     def test_classes_are_made_as_their_authors_say(self) -> None:
         @rp.data
