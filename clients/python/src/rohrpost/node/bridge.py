@@ -59,6 +59,9 @@ class Bridge(NodeHost):
         self._items = {item.name: item for item in self._interface.description.data}
         self._numbered = {item.number: item for item in self._items.values()}
         self._functions = {function.number: function for function in self._interface.description.functions}
+        self._arguments = {
+            number: Tuple(tuple(field.type for field in its.arguments)) for number, its in self._functions.items()
+        }
         self._module: Module | None = None
         self._settings: dict[str, Any] = {}
         self._followed: dict[int, Handler] = {}
@@ -120,19 +123,17 @@ class Bridge(NodeHost):
     ) -> None:
         """Data or a record that one of its functions follows."""
         handler = self._followed[follow]
-        its = handler.mark
-        what = f"`{its.stream}`" if isinstance(its, OnRecord) else f"`{its.data}`"
-        type = self._type(field, handler, f"{what} of {its.publisher}")
+        type = self._types.get((handler.name, field)) or self._type(field, handler)
         try:
             held = Held(type, data)
         except WalkError as error:
-            raise Misuse(f"{what} of {its.publisher} cannot be read: {error}") from None
+            raise Misuse(f"{_followed(handler)} cannot be read: {error}") from None
         try:
             getattr(self._its(), handler.name)(held.value)
         finally:
             is_free = held.release()
         if not is_free:
-            raise kept(f"record {sequence} of {what} of {its.publisher}")
+            raise kept(f"record {sequence} of {_followed(handler)}")
 
     @_told
     def ready(self, watch: int, readable: bool, writable: bool) -> None:
@@ -144,8 +145,7 @@ class Bridge(NodeHost):
         """Runs a function: its result; or none, whether the arguments are to blame, and why."""
         function, handler = self._functions[number], self._interface.commands[number]
         try:
-            fields = Tuple(tuple(field.type for field in function.arguments))
-            values = decode(fields, arguments)
+            values = decode(self._arguments[number], arguments)
         except WalkError as error:
             return None, True, str(error)
         has_error = handler.mark.error is not None
@@ -265,12 +265,10 @@ class Bridge(NodeHost):
         except WalkError as error:
             raise Misuse(f"{self._class.__name__}.{item.name}: {error.within('value')}") from None
 
-    def _type(self, field: bytes, handler: Handler, what: str) -> Type:
-        """The type of what came, with the author's classes, if the function names one."""
-        found = self._types.get((handler.name, field))
-        if found is None:
-            found = self._checked(field, handler.type, what, f"`{handler.name}` takes")
-            self._types[handler.name, field] = found
+    def _type(self, field: bytes, handler: Handler) -> Type:
+        """The type of what came for the first time, with the author's classes, if the function names one."""
+        found = self._checked(field, handler.type, _followed(handler), f"`{handler.name}` takes")
+        self._types[handler.name, field] = found
         return found
 
     @staticmethod
@@ -282,3 +280,9 @@ class Bridge(NodeHost):
             words = f"{what} is {describe_type(theirs)}, but {wants} {describe_type(ours)}"
             raise Misuse(f"{words}; names of types and units count, too")
         return ours
+
+
+def _followed(handler: Handler) -> str:
+    """What a function follows, in words."""
+    its = handler.mark
+    return f"`{its.stream if isinstance(its, OnRecord) else its.data}` of {its.publisher}"

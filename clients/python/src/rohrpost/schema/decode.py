@@ -18,17 +18,32 @@ import struct
 from typing import Any
 
 from .errors import WalkError, counted
+from .readers import READERS, UNREAD, Lend, Reader
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
 
+_READER = READERS.name
 
-def decode(type: Type, data: bytes) -> Any:
-    """The value that all of ``data`` holds. Raises :class:`WalkError`, with the path to where it showed."""
-    value, left = decode_front(type, data)
+
+def decode(type: Type, data: bytes | memoryview, lend: Lend = None) -> Any:
+    """The value that all of ``data`` holds. ``lend``: what ``bytes`` in it become, by where they begin and end; else
+    they are copied. Raises :class:`WalkError`, with the path to where it showed."""
+    read: Reader | None = type.__dict__.get(_READER)
+    if read is not None:
+        try:
+            value, end = read(data, 0, lend)
+            if end == len(data):
+                return value
+        except UNREAD:
+            pass  # What is wrong, and where, is found below.
+    decoder = Decoder(data, lend)
+    value = decoder.value(type)
+    left = len(data) - decoder.at
     if left:
         raise WalkError(f"{counted(left, 'byte')} too many")
+    READERS.used(type)
     return value
 
 
@@ -42,8 +57,9 @@ def decode_front(type: Type, data: bytes) -> tuple[Any, int]:
 class Decoder:
     """Reads one value after the other."""
 
-    def __init__(self, data: bytes | memoryview) -> None:
+    def __init__(self, data: bytes | memoryview, lend: Lend = None) -> None:
         self.data = data
+        self.lend = lend
         self.at = 0
         self.depth = 0
         self.empty_left = EMPTY_MAX
@@ -195,7 +211,11 @@ class Decoder:
 
     def octets(self) -> Any:
         """Bytes that are a value."""
-        return self.counted()
+        if self.lend is None:
+            return self.counted()
+        length = self.varint(64)
+        start = self.skip(length)
+        return self.lend(start, self.at)
 
     def take(self, length: int) -> bytes:
         start = self.skip(length)
