@@ -107,10 +107,10 @@ pub extern "C" fn rohrpost_unwatch(node: NodeHandle, watch: u32) -> Code {
     })
 }
 
-/// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has
-/// passed (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what
-/// came at the last moment is there too: take from each what is there, and wait again. What has a package or record in
-/// hand cannot be waited for: release it first.
+/// Waits until one of `count` mailboxes and streams has something or a watched descriptor is ready, at most
+/// `timeout_ns`, 0: not at all, below 0: for ever; `ROHRPOST_NOTHING` when nothing is there then. It may return early
+/// for no reason, also for a signal: take from each what is there, and wait again. What has a package or record in hand
+/// cannot be waited for: release it first.
 ///
 /// Thread: that of the node and of all sources, which were opened by this node.
 ///
@@ -178,7 +178,10 @@ fn wait(node: &mut NodeObject, sources: &mut [&mut dyn Source], timeout_ns: i64)
         _ => _ = wait_any(sources, waiting, || false),
     }
     let is_over = waiting.deadline.is_some_and(|deadline| Instant::now() >= deadline);
-    if is_over { Err(Code::Nothing) } else { Ok(()) }
+    // What was there before, and what came at the last moment.
+    let is_ready = node.watches.as_ref().is_some_and(Watches::has_ready);
+    let is_there = is_ready || sources.iter().any(|source| source.may_have());
+    if is_over && !is_there { Err(Code::Nothing) } else { Ok(()) }
 }
 
 /// Tells a descriptor that was ready when `rohrpost_wait` returned; each is told once, then `ROHRPOST_NOTHING`. Thread:

@@ -228,7 +228,10 @@ static void waits_for_mailboxes_streams_and_descriptors(rohrpost_node node) {
     rohrpost_source sources[3] = {{receiver.id}, {reader.id}, {0}};
     GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, sources, 2, 1000000));
     GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, NULL, 0, 1000000));
+    // Not at all: it tells what is there already.
+    GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, sources, 2, 0));
     DONE(rohrpost_send(sender, &COMMAND, "x", 1));
+    DONE(rohrpost_wait(node, sources, 2, 0));
     DONE(rohrpost_wait(node, sources, 2, -1));
     rohrpost_package package;
     DONE(rohrpost_receive(receiver, 0, &package));
@@ -236,6 +239,7 @@ static void waits_for_mailboxes_streams_and_descriptors(rohrpost_node node) {
     DONE(rohrpost_receiver_release(receiver));
     const rohrpost_stamp at = {1, 1};
     DONE(rohrpost_stream_write(writer, at, "r", 1, NULL));
+    DONE(rohrpost_wait(node, sources, 2, 0));
     DONE(rohrpost_wait(node, sources, 2, -1));
     rohrpost_record record;
     DONE(rohrpost_stream_next(reader, 0, &record, NULL));
@@ -254,7 +258,9 @@ static void waits_for_mailboxes_streams_and_descriptors(rohrpost_node node) {
     GIVES(ROHRPOST_VALUE, rohrpost_watch(node, 9999, ROHRPOST_READ, &none));
     GIVES(ROHRPOST_VALUE, rohrpost_watch(node, -1, ROHRPOST_READ, &none));
     GIVES(ROHRPOST_VALUE, rohrpost_watch(node, ends[0], 0, &none));
+    GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, sources, 2, 0));
     CHECK(write(ends[1], "!", 1) == 1);
+    DONE(rohrpost_wait(node, sources, 2, 0));
     DONE(rohrpost_wait(node, sources, 2, -1));
     DONE(rohrpost_next_ready(node, &ready));
     CHECK(ready.watch == watch && ready.readable && !ready.writable);
