@@ -233,6 +233,9 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
     let bodies: Vec<&str> = records.lines().map(|line| line.rsplit_once("  ").unwrap().1).collect();
     let expected = ["{number: 7, bytes: [97, 98, 99]}", "{number: 8, bytes: [120, 121]}", "{number: 7, bytes: [122]}"];
     assert_eq!(bodies, expected, "{records}");
+    place.say(&["call", "asker.0", "fork"]).ok();
+    place.say(&["call", "asker.0", "fork"]).ok();
+    assert_eq!(robot.state("asker.0"), "on", "its children have given up nothing of it");
     let failed = place.say(&["call", "asker.0", "fail"]).fails();
     assert!(failed.contains("it does not say why"), "{failed}");
     assert_eq!(robot.state("asker.0"), "error");

@@ -5,6 +5,7 @@ use rohrpost_mailbox::Waiting;
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_void};
 use std::fmt::{Arguments, Write};
+use std::io::Write as _;
 use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
@@ -67,6 +68,11 @@ pub extern "C" fn rohrpost_last_error() -> *const c_char {
 /// What was wrong with the last call that failed in this thread.
 pub(crate) fn last_words() -> String {
     LAST.with_borrow(|last| String::from_utf8_lossy(&last.bytes[..last.len]).into_owned())
+}
+
+/// Says a line on the standard error, if there still is one.
+pub(crate) fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// Runs a call: what it returns becomes a code, and so does a panic.

@@ -12,8 +12,9 @@ pub use in_place::*;
 use crate::code::Code;
 use crate::decode::{Decoder, decoder};
 use crate::description::{InterfaceTable, ParameterTable, described, list, parameters};
-use crate::edge::{edge, given, last_words, needed_text, say, text};
+use crate::edge::{edge, given, last_words, needed_text, say, tell, text};
 use crate::encode::{Encoder, encoder};
+use crate::fork;
 use crate::waiting::ReadyDescriptor;
 use current::entered;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Ready};
@@ -98,6 +99,7 @@ pub unsafe extern "C" fn rohrpost_module_run(
     arguments: *const *const c_char,
 ) -> c_int {
     let mut code = 1;
+    fork::watch();
     // As in each program of Rust: when launch has died, nobody reads what the module prints, and it still has to go to
     // its safe state.
     // SAFETY: no handler of anybody's is called from now on.
@@ -114,7 +116,7 @@ pub unsafe extern "C" fn rohrpost_module_run(
         Ok(())
     });
     if ended != Code::Ok {
-        eprintln!("{}", last_words());
+        tell(&last_words());
     }
     code
 }

@@ -12,9 +12,9 @@
 
 use crate::code::Code;
 use crate::edge::say;
+use crate::fork;
 use crate::objects::{Kind, Object};
 use std::cell::RefCell;
-use std::sync::Once;
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
 /// Places of a table.
@@ -22,16 +22,10 @@ const PLACES_MAX: usize = 1 << 16;
 /// Threads are told apart by so many bits.
 const THREAD_MASK: u32 = (1 << 24) - 1;
 
-/// How often this process became a child by `fork`: what was opened before that is its parent's.
-static FORKS: AtomicU32 = AtomicU32::new(0);
 /// What a child has of its parent, never dropped. Here, for programs that look for memory which nobody knows any more.
 static OF_PARENT: AtomicPtr<Vec<Place>> = AtomicPtr::new(std::ptr::null_mut());
 /// The last thread that was counted.
 static THREADS: AtomicU32 = AtomicU32::new(0);
-
-extern "C" fn count_fork() {
-    FORKS.fetch_add(1, Ordering::Relaxed);
-}
 
 struct Place {
     turn: u16,
@@ -50,10 +44,7 @@ thread_local! {
 
 impl Table {
     fn new() -> Self {
-        static WATCH_FORKS: Once = Once::new();
-        // SAFETY: the function only changes an atomic, which a child of a process with threads may do. (Without memory
-        // for it, forks go unseen, and so does everything else soon.)
-        WATCH_FORKS.call_once(|| _ = unsafe { libc::pthread_atfork(None, None, Some(count_fork)) });
+        fork::watch();
         // Not 0, with which no handle begins.
         let thread = loop {
             match THREADS.fetch_add(1, Ordering::Relaxed) & THREAD_MASK {
@@ -61,11 +52,11 @@ impl Table {
                 thread => break thread,
             }
         };
-        Self { thread, forks: FORKS.load(Ordering::Relaxed), places: Vec::new() }
+        Self { thread, forks: fork::forks(), places: Vec::new() }
     }
 
     fn is_forked(&self) -> bool {
-        self.forks != FORKS.load(Ordering::Relaxed)
+        self.forks != fork::forks()
     }
 
     fn store(&mut self, object: Object, kind: u8) -> Result<u64, Code> {

@@ -5,12 +5,15 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
-enum { CHECK_ALL = 16, FAIL = 17, SMALL = 1, SECOND_NS = 1000 * 1000 * 1000 };
+enum { CHECK_ALL = 16, FAIL = 17, FORK = 18, SMALL = 1, SECOND_NS = 1000 * 1000 * 1000 };
 
 static const rohrpost_function FUNCTIONS[] = {
     ROHRPOST_ASKED(CHECK_ALL, "check", ROHRPOST_TEXT, "Its settings, if all is well."),
     ROHRPOST_ASKED(FAIL, "fail", ROHRPOST_UNIT, NULL),
+    ROHRPOST_ASKED(FORK, "fork", ROHRPOST_UNIT, NULL),
 };
 static const rohrpost_field SMALL_FIELDS[] = {
     ROHRPOST_FIELD("number", ROHRPOST_U8, NULL, NULL),
@@ -153,8 +156,27 @@ static rohrpost_outcome beside(void) {
     return rohrpost_node_close(node);
 }
 
+// A child is no second module: its calls are refused, and it does not come back to the loop.
+static rohrpost_outcome forks(void) {
+    int status;
+    pid_t child = fork();
+    if (child == 0) {
+        _exit(rohrpost_module_publish(SMALL, 0, "\x09\x00", 2) == ROHRPOST_FORKED ? 0 : 1);
+    }
+    HOLDS(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    child = fork();
+    if (child == 0) {
+        return ROHRPOST_OK;
+    }
+    HOLDS(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 70);
+    return ROHRPOST_OK;
+}
+
 static rohrpost_outcome command(void *user, uint16_t number, rohrpost_decoder *arguments, rohrpost_encoder *reply) {
     (void)user;
+    if (number == FORK) {
+        return forks();
+    }
     if (number != CHECK_ALL) {
         // Without words: the last error is not another call's.
         return -1;
