@@ -322,6 +322,19 @@ static void handles_belong_to_their_thread_and_process(rohrpost_node node, const
     CHECK(memcmp(package.body, "still here", 10) == 0);
 }
 
+// A failure that nobody can hear is one all the same: here nobody reads what the process says.
+static void a_module_fails_in_order_that_nobody_hears(void) {
+    pid_t child = fork();
+    CHECK(child >= 0);
+    if (child == 0) {
+        int ends[2];
+        CHECK(pipe(ends) == 0 && dup2(ends[1], 2) == 2 && close(ends[0]) == 0);
+        _exit(rohrpost_module_run(NULL, 0, NULL) == 1 ? 0 : 1);
+    }
+    int status;
+    CHECK(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
 int main(int count, char **arguments) {
     CHECK(count == 2);
     const char *directory = arguments[1];
@@ -333,6 +346,7 @@ int main(int count, char **arguments) {
     streams_are_written_and_read_in_place(node);
     waits_for_mailboxes_streams_and_descriptors(node);
     handles_belong_to_their_thread_and_process(node, directory);
+    a_module_fails_in_order_that_nobody_hears();
     // What is open is closed at the end.
     puts("all is well");
     return 0;
