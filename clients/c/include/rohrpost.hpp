@@ -1,7 +1,8 @@
 // Rohrpost for C++17: thin wrappers around rohrpost.h that close what they open, and throw what fails.
 //
-// A handle belongs to the thread that opened it, so does its wrapper. What is in hand (a package, a record, a loan)
-// belongs to its wrapper, which must outlive it, and is given back by its own destructor.
+// A handle belongs to the thread that opened it, so does its wrapper: it must be destroyed there. A package or record in
+// hand is given back by its own destructor, in the same thread and before that of its receiver or reader; while one is
+// in hand, its receiver or reader refuses (`ROHRPOST_BUSY`) to hand out another one.
 
 #ifndef ROHRPOST_HPP
 #define ROHRPOST_HPP
@@ -150,9 +151,10 @@ public:
         check(rohrpost_receiver_open(node.handle(), name, shape, &handle_));
     }
 
-    // None if the time has passed.
+    // None if the time has passed. One at a time.
     std::optional<Package> receive(int64_t timeout_ns = -1) {
         rohrpost_package package;
+        check(rohrpost_source_idle(source()));
         if (!check(rohrpost_receive(handle_, timeout_ns, &package))) {
             return std::nullopt;
         }
@@ -215,6 +217,7 @@ public:
     std::optional<Record> next(int64_t timeout_ns = -1) {
         rohrpost_record record;
         rohrpost_code code;
+        check(rohrpost_source_idle(source()));
         do {
             code = rohrpost_stream_next(handle_, timeout_ns, &record, nullptr);
         } while (code == ROHRPOST_LOST);
@@ -224,6 +227,7 @@ public:
     // The newest record; none before the first.
     std::optional<Record> newest() {
         rohrpost_record record;
+        check(rohrpost_source_idle(source()));
         return in_hand(rohrpost_stream_newest(handle_, &record), record);
     }
 

@@ -148,13 +148,28 @@ pub unsafe extern "C" fn rohrpost_wait(
     })
 }
 
+/// `ROHRPOST_BUSY` while a package or record of this receiver or reader is in hand. Thread: that of the source.
+#[unsafe(no_mangle)]
+pub extern "C" fn rohrpost_source_idle(source: WaitSource) -> Code {
+    edge(|| {
+        let is_idle = match table::is_a::<ReaderObject>(source.id) {
+            true => table::with(source.id, |reader: &mut ReaderObject| Ok(reader.free().is_some())),
+            false => table::with(source.id, |receiver: &mut ReceiverObject| Ok(receiver.free().is_some())),
+        }?;
+        if is_idle { Ok(()) } else { Err(busy()) }
+    })
+}
+
+fn busy() -> Code {
+    say(Code::Busy, format_args!("a source has something in hand: release it first"))
+}
+
 /// Where the receiver or reader of a handle is.
 fn source(id: u64, participant: &Arc<Participant>) -> Result<*mut dyn Source, Code> {
     let own = |other: &Arc<Participant>| match Arc::ptr_eq(other, participant) {
         true => Ok(()),
         false => Err(say(Code::Value, format_args!("a source was opened by another node than this one"))),
     };
-    let busy = || say(Code::Busy, format_args!("a source has something in hand: release it first"));
     if table::is_a::<ReaderObject>(id) {
         table::with(id, |reader: &mut ReaderObject| {
             let reader = reader.free().ok_or_else(busy)?;

@@ -186,6 +186,13 @@ static void streams_are_written_and_read_in_place(rohrpost_node node) {
     CHECK(record.about.sequence == 9);
     rohrpost_records_around around;
     at.ns = 1008;
+    // They do not take away what is in hand.
+    const rohrpost_source source = {reader.id};
+    GIVES(ROHRPOST_BUSY, rohrpost_source_idle(source));
+    GIVES(ROHRPOST_BUSY, rohrpost_stream_around(reader, at, &around));
+    GIVES(ROHRPOST_BUSY, rohrpost_stream_missed(reader, &missed));
+    DONE(rohrpost_stream_reader_release(reader));
+    DONE(rohrpost_source_idle(source));
     DONE(rohrpost_stream_around(reader, at, &around));
     CHECK(around.before.sequence == 8 && around.after.sequence == 8);
     DONE(rohrpost_stream_record(reader, 8, &record));

@@ -173,8 +173,14 @@ fn hand_out(
     })
 }
 
-/// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. What is in hand is released.
-/// `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
+/// A reader with nothing in hand.
+fn idle(reader: &mut ReaderObject) -> Result<&mut StreamReader, Code> {
+    let busy = || say(Code::Busy, format_args!("this reader has a record in hand: release it first"));
+    reader.free().ok_or_else(busy)
+}
+
+/// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. `ROHRPOST_BUSY` while a record
+/// is in hand: release it first. `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_around(
     reader: ReaderHandle,
@@ -183,8 +189,8 @@ pub extern "C" fn rohrpost_stream_around(
 ) -> Code {
     edge(|| {
         let out = place(records, "records")?;
-        let found =
-            table::with(reader.id, |reader: &mut ReaderObject| reader.back().around(stamp(at)).map_err(failed))?;
+        let around = |reader: &mut ReaderObject| idle(reader)?.around(stamp(at)).map_err(failed);
+        let found = table::with(reader.id, around)?;
         let nothing = |why: std::fmt::Arguments<'_>| Err(say(Code::Nothing, why));
         match found {
             Around::Records { before, after } => {
@@ -212,7 +218,8 @@ pub extern "C" fn rohrpost_stream_reader_release(reader: ReaderHandle) -> Code {
     })
 }
 
-/// How many records this reader did not get since it was opened, by cause. What is in hand is released.
+/// How many records this reader did not get since it was opened, by cause. `ROHRPOST_BUSY` while a record is in hand:
+/// release it first.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_missed(
     reader: ReaderHandle,
@@ -220,7 +227,7 @@ pub extern "C" fn rohrpost_stream_missed(
 ) -> Code {
     edge(|| {
         let out = place(missed, "missed")?;
-        let missed = table::with(reader.id, |reader: &mut ReaderObject| Ok(reader.back().missed()))?;
+        let missed = table::with(reader.id, |reader: &mut ReaderObject| Ok(idle(reader)?.missed()))?;
         out.write(RecordsMissed { lost: missed.lost, sampled: missed.sampled, passed_over: missed.passed_over });
         Ok(())
     })
