@@ -18,6 +18,13 @@ pub struct Decoder {
     pub state: i32,
 }
 
+impl Decoder {
+    /// Whether what was read is not of its type, or something is left behind it.
+    pub(crate) fn is_malformed(&self) -> bool {
+        self.state != Code::Ok as i32 || self.left > 0
+    }
+}
+
 /// To read these bytes.
 pub(crate) fn decoder(bytes: &[u8]) -> Decoder {
     Decoder { bytes: bytes.as_ptr(), left: bytes.len(), state: Code::Ok as i32 }

@@ -15,6 +15,8 @@ const MESSAGE_BYTES: usize = 1024;
 
 /// What a call of this thread said last when it failed.
 struct Message {
+    /// How often this thread has said something.
+    count: u32,
     len: usize,
     bytes: [u8; MESSAGE_BYTES],
 }
@@ -32,13 +34,13 @@ impl Write for Message {
 }
 
 thread_local! {
-    static LAST: RefCell<Message> = const { RefCell::new(Message { len: 0, bytes: [0; MESSAGE_BYTES] }) };
+    static LAST: RefCell<Message> = const { RefCell::new(Message { count: 0, len: 0, bytes: [0; MESSAGE_BYTES] }) };
 }
 
 /// Keeps the words of a failure for this thread.
 pub(crate) fn say(code: Code, words: Arguments<'_>) -> Code {
     LAST.with_borrow_mut(|last| {
-        last.len = 0;
+        (last.count, last.len) = (last.count.wrapping_add(1), 0);
         // It takes all, and cuts what is too long.
         let _ = last.write_fmt(words);
         last.bytes[last.len] = 0;
@@ -73,6 +75,11 @@ pub(crate) fn last_words() -> String {
 /// Says a line on the standard error, if there still is one.
 pub(crate) fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// How often this thread has said something.
+pub(crate) fn said() -> u32 {
+    LAST.with_borrow(|last| last.count)
 }
 
 /// Runs a call: what it returns becomes a code, and so does a panic.

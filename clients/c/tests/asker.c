@@ -8,12 +8,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { CHECK_ALL = 16, FAIL = 17, FORK = 18, SMALL = 1, SECOND_NS = 1000 * 1000 * 1000 };
+enum { CHECK_ALL = 16, FAIL = 17, FORK = 18, TYPO = 19, BAD_REPLY = 20, SMALL = 1, SECOND_NS = 1000 * 1000 * 1000 };
 
 static const rohrpost_function FUNCTIONS[] = {
     ROHRPOST_ASKED(CHECK_ALL, "check", ROHRPOST_TEXT, "Its settings, if all is well."),
     ROHRPOST_ASKED(FAIL, "fail", ROHRPOST_UNIT, NULL),
     ROHRPOST_ASKED(FORK, "fork", ROHRPOST_UNIT, NULL),
+    ROHRPOST_ASKED(TYPO, "typo", ROHRPOST_UNIT, NULL),
+    ROHRPOST_ASKED(BAD_REPLY, "bad-reply", ROHRPOST_UNIT, NULL),
 };
 static const rohrpost_field SMALL_FIELDS[] = {
     ROHRPOST_FIELD("number", ROHRPOST_U8, NULL, NULL),
@@ -176,6 +178,15 @@ static rohrpost_outcome command(void *user, uint16_t number, rohrpost_decoder *a
     (void)user;
     if (number == FORK) {
         return forks();
+    }
+    rohrpost_decoder value;
+    if (number == TYPO) {
+        return rohrpost_module_parameter("typo", &value);
+    }
+    if (number == BAD_REPLY) {
+        value = rohrpost_decode("", 0);
+        rohrpost_get_u8(&value);
+        return rohrpost_decoded(&value);
     }
     if (number != CHECK_ALL) {
         // Without words: the last error is not another call's.

@@ -47,6 +47,11 @@ impl NativeContext<'_> {
         self.context.installation()
     }
 
+    /// Whether its description has a function of this number.
+    pub fn offers(&self, number: u16) -> bool {
+        self.state.description.functions.iter().any(|function| function.number == number)
+    }
+
     /// Its settings that are no parameters, as an object in JSON.
     pub fn settings(&self) -> &str {
         &self.state.settings
