@@ -213,7 +213,8 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
         &entry(
             "asker.0",
             &asker,
-            "calls = [\"thermometer.0\"]\nsettings = { share = 60, name = \"it\", list = [1, 2] }",
+            "calls = [\"thermometer.0\"]\nsettings = { share = 60, name = \"it\", list = [1, 2] }\n\
+             [module.stream.small]\nreaders = 1",
         ),
     ]);
     let checked = wait("it has heard of the temperature", || {

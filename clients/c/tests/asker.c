@@ -33,7 +33,7 @@ static const rohrpost_parameter PARAMETERS[] = {
 static const char *const SETTINGS[] = {"name", "list"};
 
 // What came of each thing that it follows.
-static unsigned came[3];
+static unsigned came[4];
 
 #define GIVES(code, call)                                                                              \
     do {                                                                                               \
@@ -66,7 +66,7 @@ static rohrpost_outcome made(void *user) {
 
 static rohrpost_outcome received(void *user, const rohrpost_followed *data) {
     (void)user;
-    HOLDS(data->follow < 3 && data->number == 1 && data->stamp_ns > 0);
+    HOLDS(data->follow < 4 && data->number == 1 && data->stamp_ns > 0);
     rohrpost_decoder decoder = rohrpost_decode(data->value, data->len);
     rohrpost_get_f64(&decoder);
     came[data->follow] += 1;
@@ -154,6 +154,12 @@ static rohrpost_outcome beside(void) {
     DONE(rohrpost_stream_reader_open(node, stream, &reader));
     DONE(rohrpost_stream_newest(reader, &record));
     HOLDS(record.len == 3 && memcmp(record.body, "\x07\x01z", 3) == 0);
+    // That was the only seat. What cannot be followed leaves nothing behind that hinders others.
+    uint32_t follow;
+    rohrpost_outcome refused = rohrpost_module_follow("asker.0", "small", ROHRPOST_FOLLOW_RECORDS, 0, &follow);
+    HOLDS(refused < 0 && strstr(rohrpost_last_error(), "small") != NULL);
+    DONE(rohrpost_module_follow("thermometer.0", "temperature", ROHRPOST_FOLLOW_NEWEST, 0, &follow));
+    HOLDS(follow == 3);
     DONE(rohrpost_stream_reader_close(reader));
     return rohrpost_node_close(node);
 }
