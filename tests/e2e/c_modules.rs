@@ -238,7 +238,7 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
     place.say(&["call", "asker.0", "fork"]).ok();
     assert_eq!(robot.state("asker.0"), "on", "its children have given up nothing of it");
     // Codes of calls in the function are its module's failures, and nothing that its caller did.
-    for (function, why) in [("typo", "there is no parameter `typo`"), ("bad-reply", "the bytes are not of this type")] {
+    for (function, why) in [("typo", "there is no parameter `typo`"), ("bad_reply", "the bytes are not of this type")] {
         let failed = place.say(&["call", "asker.0", function]).fails();
         assert!(failed.contains(why) && !failed.contains("argument"), "{failed}");
         assert_eq!(robot.state("asker.0"), "error");

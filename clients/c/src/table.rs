@@ -32,7 +32,7 @@ struct Place {
     object: Option<Object>,
 }
 
-struct Table {
+pub(crate) struct Table {
     thread: u32,
     forks: u32,
     places: Vec<Place>,
@@ -85,6 +85,12 @@ impl Table {
         place.filter(|place| place.object.is_some() && place.turn == (handle >> 24) as u16).ok_or_else(closed::<K>)
     }
 
+    /// What a handle stands for.
+    #[inline]
+    pub(crate) fn find<K: Kind>(&mut self, handle: u64) -> Result<&mut K, Code> {
+        self.place::<K>(handle)?.object.as_mut().and_then(K::find).ok_or_else(closed::<K>)
+    }
+
     #[cold]
     fn refuse<K: Kind>(&self, thread: u32, kind: u8) -> Code {
         let what = K::WHAT;
@@ -119,7 +125,7 @@ impl Drop for Table {
 }
 
 /// Uses this thread's table; not while it is used, as a handler of signals would.
-fn with_table<T>(use_it: impl FnOnce(&mut Table) -> Result<T, Code>) -> Result<T, Code> {
+pub(crate) fn with_table<T>(use_it: impl FnOnce(&mut Table) -> Result<T, Code>) -> Result<T, Code> {
     let used = TABLE.try_with(|table| match table.try_borrow_mut() {
         Ok(mut table) => use_it(&mut table),
         Err(_) => Err(say(Code::Busy, format_args!("another call of this thread goes on: is this a signal handler?"))),
@@ -143,10 +149,7 @@ pub(crate) fn is_a<K: Kind>(handle: u64) -> bool {
 /// Uses what a handle stands for.
 #[inline]
 pub(crate) fn with<K: Kind, T>(handle: u64, use_it: impl FnOnce(&mut K) -> Result<T, Code>) -> Result<T, Code> {
-    with_table(|table| {
-        let object = table.place::<K>(handle)?.object.as_mut().and_then(K::find);
-        use_it(object.ok_or_else(closed::<K>)?)
-    })
+    with_table(|table| use_it(table.find(handle)?))
 }
 
 /// Closes a handle, and gives what it stood for.

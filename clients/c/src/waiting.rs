@@ -4,7 +4,7 @@ use crate::code::Code;
 use crate::edge::{edge, failed, place, say, waiting};
 use crate::node::NodeHandle;
 use crate::objects::{NodeObject, ReaderObject, ReceiverObject};
-use crate::table;
+use crate::table::{self, Table};
 use arrayvec::ArrayVec;
 use rohrpost_mailbox::{Interest, Participant, Source, Watch, Watches, wait_any};
 use std::ffi::c_int;
@@ -130,20 +130,21 @@ pub unsafe extern "C" fn rohrpost_wait(
         // SAFETY: the caller's promise; a `WaitSource` is as large as its number.
         let bytes = unsafe { crate::edge::bytes(sources.cast(), count * size_of::<WaitSource>(), "sources") }?;
         let ids = || bytes.chunks_exact(8).filter_map(|id| id.first_chunk()).map(|id| u64::from_ne_bytes(*id));
-        let participant = table::with(node.id, |node: &mut NodeObject| Ok(node.participant.clone()))?;
-        let mut pointers = ArrayVec::<*mut dyn Source, ROHRPOST_SOURCES_MAX>::new();
-        for (at, id) in ids().enumerate() {
-            if ids().take(at).any(|other| other == id) {
-                return Err(say(Code::Value, format_args!("source {at} is there twice")));
+        // In one use of the table: a handler of signals can close nothing meanwhile.
+        table::with_table(|table| {
+            let participant = table.find::<NodeObject>(node.id)?.participant.clone();
+            let mut pointers = ArrayVec::<*mut dyn Source, ROHRPOST_SOURCES_MAX>::new();
+            for (at, id) in ids().enumerate() {
+                if ids().take(at).any(|other| other == id) {
+                    return Err(say(Code::Value, format_args!("source {at} is there twice")));
+                }
+                pointers.push(source(table, id, &participant)?);
             }
-            pointers.push(source(id, &participant)?);
-        }
-        table::with(node.id, |node: &mut NodeObject| {
-            // SAFETY: each points to what a handle of this thread owns, all are different, nothing is borrowed from
-            // them, and nothing else of this thread runs while the table is used.
+            // SAFETY: each points to what a handle of this thread owns, at an address of its own; all are different,
+            // nothing is borrowed from them, and nothing else of this thread uses the table meanwhile.
             let mut sources: ArrayVec<&mut dyn Source, ROHRPOST_SOURCES_MAX> =
                 pointers.iter().map(|pointer| unsafe { &mut **pointer }).collect();
-            wait(node, &mut sources, timeout_ns)
+            wait(table.find(node.id)?, &mut sources, timeout_ns)
         })
     })
 }
@@ -165,23 +166,19 @@ fn busy() -> Code {
 }
 
 /// Where the receiver or reader of a handle is.
-fn source(id: u64, participant: &Arc<Participant>) -> Result<*mut dyn Source, Code> {
+fn source(table: &mut Table, id: u64, participant: &Arc<Participant>) -> Result<*mut dyn Source, Code> {
     let own = |other: &Arc<Participant>| match Arc::ptr_eq(other, participant) {
         true => Ok(()),
         false => Err(say(Code::Value, format_args!("a source was opened by another node than this one"))),
     };
     if table::is_a::<ReaderObject>(id) {
-        table::with(id, |reader: &mut ReaderObject| {
-            let reader = reader.free().ok_or_else(busy)?;
-            own(reader.participant())?;
-            Ok(std::ptr::from_mut(reader) as *mut dyn Source)
-        })
+        let reader = table.find::<ReaderObject>(id)?.free().ok_or_else(busy)?;
+        own(reader.participant())?;
+        Ok(std::ptr::from_mut(reader) as *mut dyn Source)
     } else {
-        table::with(id, |receiver: &mut ReceiverObject| {
-            let receiver = receiver.free().ok_or_else(busy)?;
-            own(receiver.participant())?;
-            Ok(std::ptr::from_mut(receiver) as *mut dyn Source)
-        })
+        let receiver = table.find::<ReceiverObject>(id)?.free().ok_or_else(busy)?;
+        own(receiver.participant())?;
+        Ok(std::ptr::from_mut(receiver) as *mut dyn Source)
     }
 }
 

@@ -15,7 +15,7 @@ static const rohrpost_function FUNCTIONS[] = {
     ROHRPOST_ASKED(FAIL, "fail", ROHRPOST_UNIT, NULL),
     ROHRPOST_ASKED(FORK, "fork", ROHRPOST_UNIT, NULL),
     ROHRPOST_ASKED(TYPO, "typo", ROHRPOST_UNIT, NULL),
-    ROHRPOST_ASKED(BAD_REPLY, "bad-reply", ROHRPOST_UNIT, NULL),
+    ROHRPOST_ASKED(BAD_REPLY, "bad_reply", ROHRPOST_UNIT, NULL),
 };
 static const rohrpost_field SMALL_FIELDS[] = {
     ROHRPOST_FIELD("number", ROHRPOST_U8, NULL, NULL),
