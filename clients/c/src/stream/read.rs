@@ -99,10 +99,12 @@ pub extern "C" fn rohrpost_stream_reader_close(reader: ReaderHandle) -> Code {
     edge(|| table::close::<ReaderObject>(reader.id).map(drop))
 }
 
-/// Takes the next record, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0: for ever;
-/// `ROHRPOST_NOTHING` when there is none. `ROHRPOST_LOST` when the writer has passed this reader: `lost`, which may be
-/// null, is how many records; then call it again. The record is in hand until the next one is taken, it is released, or
-/// the reader is closed; meanwhile the writer goes round it.
+/// Takes the next record, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0: for ever,
+/// which no signal ends (`rohrpost_wait` returns then); `ROHRPOST_NOTHING` when there is none. `ROHRPOST_LOST` when the
+/// writer has passed this reader: `lost`, which may be null, is how many records; then call it again.
+///
+/// The record is in hand until the next call that takes one from this reader, whatever that returns, or until it is
+/// released or the reader is closed; meanwhile the writer goes round it. Its bytes are aligned to nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_next(
     reader: ReaderHandle,
