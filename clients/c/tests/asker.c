@@ -88,6 +88,7 @@ static rohrpost_outcome calls(void) {
     GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", 16, bytes, len - 1, long_ns, &reply));
     GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", 99, NULL, 0, long_ns, &reply));
     GIVES(ROHRPOST_CONFIGURATION, rohrpost_module_call("nobody.0", 16, NULL, 0, long_ns, &reply));
+    HOLDS(rohrpost_get_u8(&reply) == 0 && rohrpost_decoded(&reply) == ROHRPOST_MALFORMED);
     DONE(rohrpost_module_get("thermometer.0", 1, long_ns, &reply));
     HOLDS(rohrpost_get_u64(&reply) > 0);
     rohrpost_get_f64(&reply);
@@ -110,6 +111,8 @@ static rohrpost_outcome own(void) {
     GIVES(ROHRPOST_VALUE, rohrpost_module_set_parameter("share", "", 0));
     GIVES(ROHRPOST_NO_ITEM, rohrpost_module_set_parameter("speed", "\x46", 1));
     GIVES(ROHRPOST_NO_ITEM, rohrpost_module_parameter("speed", &value));
+    // It is written all the same: nothing is in it.
+    HOLDS(rohrpost_get_u8(&value) == 0 && rohrpost_decoded(&value) == ROHRPOST_MALFORMED);
     GIVES(ROHRPOST_VALUE, rohrpost_module_watch(9999, ROHRPOST_READ, &watch));
     GIVES(ROHRPOST_VALUE, rohrpost_module_unwatch(7));
     return ROHRPOST_OK;
