@@ -61,6 +61,9 @@ static rohrpost_outcome made(void *user) {
     DONE(rohrpost_module_follow("thermometer.0", "temperature", ROHRPOST_FOLLOW_PERIOD, SECOND_NS / 5, &follow));
     HOLDS(follow == 2);
     GIVES(ROHRPOST_CONFIGURATION, rohrpost_module_follow("nobody.0", "x", ROHRPOST_FOLLOW_EACH, 0, &follow));
+    // Left open: it is given up when the function ends.
+    uint8_t *room;
+    DONE(rohrpost_module_begin(SMALL, 0, "\x01\x00", 2, 1, &room));
     return ROHRPOST_OK;
 }
 

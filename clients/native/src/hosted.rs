@@ -34,7 +34,11 @@ pub fn run(
         move |_: &Settings, installation: &Installation| Ok(vec![StandIn { name: serves(installation), description }]);
     run_described(start, described, move |settings, context| {
         let mut state = state(interface, settings, serves_too(context.installation()))?;
-        let module = make(&mut NativeContext { context, state: &mut state })?;
+        let mut context = NativeContext { context, state: &mut state };
+        let made = make(&mut context);
+        // As after each part of its code.
+        context.abandon();
+        let module = made?;
         Ok(Hosted { module, state })
     })
 }

@@ -148,8 +148,8 @@ thread_local! {
 }
 
 /// Runs a function of another module, `motor.0`, by its number: arguments are values one behind the other, and so is
-/// the result, to be read from `reply`; it is there until the next such call, and empty when this fails. Waits for it at most `timeout_ns`, and
-/// all else of the module with it. The first call asks the other one what it offers.
+/// the result, to be read from `reply`; it is there until the next such call, and empty when this fails. Waits for it
+/// at most `timeout_ns`, and all else of the module with it. The first call asks the other one what it offers.
 ///
 /// # Safety
 /// The text is null or ends with a zero; `arguments` is null, or points to `len` bytes.
