@@ -9,6 +9,7 @@
 
 #include "rohrpost.h"
 
+#include <chrono>
 #include <exception>
 #include <optional>
 #include <stdexcept>
@@ -164,7 +165,8 @@ public:
     // Closes it and removes its mailbox; how many packages waited there.
     size_t remove() {
         size_t lost;
-        check(rohrpost_receiver_remove(std::exchange(handle_, rohrpost_receiver{0}), &lost));
+        check(rohrpost_receiver_remove(handle_, &lost));
+        handle_ = rohrpost_receiver{0};
         return lost;
     }
 
@@ -213,14 +215,19 @@ public:
         check(rohrpost_stream_reader_open(node.handle(), stream, &handle_));
     }
 
-    // The next record that is there; none if the time has passed. What was lost before it is in `missed`.
+    // The next record that is there; none if the time has passed. What was lost before it is in `missed`. One at a time.
     std::optional<Record> next(int64_t timeout_ns = -1) {
         rohrpost_record record;
         rohrpost_code code;
         check(rohrpost_source_idle(source()));
-        do {
-            code = rohrpost_stream_next(handle_, timeout_ns, &record, nullptr);
-        } while (code == ROHRPOST_LOST);
+        const auto began = std::chrono::steady_clock::now();
+        int64_t left_ns = timeout_ns;
+        while ((code = rohrpost_stream_next(handle_, left_ns, &record, nullptr)) == ROHRPOST_LOST) {
+            if (timeout_ns > 0) {
+                const std::chrono::nanoseconds passed = std::chrono::steady_clock::now() - began;
+                left_ns = passed.count() < timeout_ns ? timeout_ns - passed.count() : 0;
+            }
+        }
         return in_hand(code, record);
     }
 

@@ -29,7 +29,7 @@ use std::ffi::{CString, c_char, c_int, c_void};
 pub type Outcome = i32;
 
 /// A module. One thread calls all its functions, one at a time, with `user`; any of them may be null. None of them may
-/// let an exception of C++ out.
+/// let an exception of C++ out, or leave by `longjmp`, `pthread_exit` or `pthread_cancel`: calls of Rust lie below them.
 #[repr(C)]
 pub struct ModuleTable {
     /// What it offers.

@@ -4,6 +4,8 @@
 
 #include "check.h"
 
+#include <thread>
+
 namespace {
 
 constexpr uint32_t OWN = ROHRPOST_NAME(1, 200, 0, 0);
@@ -54,6 +56,8 @@ int main(int, char **arguments) {
     sender.send(LABEL, "left");
     rohrpost::Sender moved = std::move(sender);
     throws(ROHRPOST_HANDLE, [&] { sender.send(LABEL, "x"); });
+    // In another thread nothing happens, and it can still be removed here.
+    std::thread([&] { throws(ROHRPOST_THREAD, [&] { receiver.remove(); }); }).join();
     CHECK(receiver.remove() == 1);
 
     const rohrpost_stream stream = {OWN, 1};
