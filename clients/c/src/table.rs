@@ -7,8 +7,8 @@
 //!  └───────────┴──────────────┴────────┴────────┘
 //! ```
 //!
-//! A table is its thread's own, so a look-up takes no lock. A place that is used again has another turn, so a closed
-//! handle is found until its place was used 65 536 times.
+//! A table is its thread's own, so a look-up takes no lock. A place that is used again has another turn, and after 65 536
+//! of them it is not used any more: a closed handle leads to nothing for ever.
 
 use crate::code::Code;
 use crate::edge::say;
@@ -29,6 +29,8 @@ static THREADS: AtomicU32 = AtomicU32::new(0);
 
 struct Place {
     turn: u16,
+    /// Its turns are used up: never again, so that no old handle finds another's object.
+    is_spent: bool,
     object: Option<Object>,
 }
 
@@ -60,13 +62,13 @@ impl Table {
     }
 
     fn store(&mut self, object: Object, kind: u8) -> Result<u64, Code> {
-        let free = self.places.iter().position(|place| place.object.is_none());
+        let free = self.places.iter().position(|place| place.object.is_none() && !place.is_spent);
         let index = free.unwrap_or(self.places.len());
         if index == PLACES_MAX {
             return Err(say(Code::Crowded, format_args!("this thread has {PLACES_MAX} open handles; close some")));
         }
         if free.is_none() {
-            self.places.push(Place { turn: 0, object: None });
+            self.places.push(Place { turn: 0, is_spent: false, object: None });
         }
         let place = &mut self.places[index];
         place.object = Some(object);
@@ -156,7 +158,14 @@ pub(crate) fn with<K: Kind, T>(handle: u64, use_it: impl FnOnce(&mut K) -> Resul
 pub(crate) fn close<K: Kind>(handle: u64) -> Result<K, Code> {
     with_table(|table| {
         let place = table.place::<K>(handle)?;
-        place.turn = place.turn.wrapping_add(1);
+        if place.object.as_mut().and_then(K::find).is_none() {
+            // A handle that nobody was given: its number says another kind than that of the object.
+            return Err(closed::<K>());
+        }
+        match place.turn.checked_add(1) {
+            Some(turn) => place.turn = turn,
+            None => place.is_spent = true,
+        }
         place.object.take().and_then(K::take).ok_or_else(closed::<K>)
     })
 }

@@ -99,6 +99,9 @@ static void mistakes_are_codes_with_words(rohrpost_node node) {
     GIVES(ROHRPOST_CLOSED, rohrpost_receive(wrong, 0, &package));
     wrong.id = UINT64_MAX;
     GIVES(ROHRPOST_HANDLE, rohrpost_receive(wrong, 0, &package));
+    // Of another kind than the sender at its place: it does no harm to that.
+    const rohrpost_stream_writer forged = {(sender.id & ~((uint64_t)0xff << 16)) | (uint64_t)4 << 16};
+    GIVES(ROHRPOST_CLOSED, rohrpost_stream_writer_close(forged));
     DONE(rohrpost_sender_close(sender));
     GIVES(ROHRPOST_CLOSED, rohrpost_sender_close(sender));
     sender = sender_to(node, OWN);
