@@ -288,10 +288,15 @@ fn a_driver_in_c_gives_the_mapper_the_odometry_that_it_makes_of_a_serial_line() 
     assert!(refused.contains("`track-m` is 20 m, out of range: 0.01..=10 m"), "{refused}");
     let refused = place.say(&["param", "set", "odometry.0", "port", "/dev/null"]).fails();
     assert!(refused.contains("the port is opened when the module starts: restart it"), "{refused}");
+    // Whatever the line says: more than a number has room for, and differences of more.
+    for counts in ["99999999999999999999 1", "9223372036854775807 0", "-9223372036854775808 0"] {
+        writeln!(wheels.line, "{counts}").unwrap();
+    }
     writeln!(wheels.line, "no counts").unwrap();
     wait("a line that cannot be read is told", || {
         place.say(&["log"]).ok().contains("something that is not two counts").then_some(())
     });
+    assert_eq!(robot.state("odometry.0"), "on");
     drop(slave);
     stop(&place, robot, &mut launch);
 }
