@@ -181,6 +181,9 @@ enum rohrpost_code
   ROHRPOST_FAULT = -29,
   // There is no such function, data, stream or parameter.
   ROHRPOST_NO_ITEM = -30,
+  // The ring of a stream cannot be used, now or at all: its seats are taken, its file is missing or damaged. The
+  // last error says which.
+  ROHRPOST_RING = -31,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -570,7 +573,7 @@ typedef struct rohrpost_ready {
 } rohrpost_ready;
 
 // A module. One thread calls all its functions, one at a time, with `user`; any of them may be null. None of them may
-// let an exception of C++ out.
+// let an exception of C++ out, or leave by `longjmp`, `pthread_exit` or `pthread_cancel`: calls of Rust lie below them.
 typedef struct rohrpost_module {
   // What it offers.
   const struct rohrpost_interface *interface;
