@@ -5,6 +5,7 @@ use crate::following::Following;
 use crate::module::{NativeInterface, NativeModule};
 use crate::parameters::Parameters;
 use crate::peers::Peers;
+use crate::record::Front;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Ready};
 use rohrpost_modules::interface::{StandIn, StandInCommand};
@@ -69,7 +70,7 @@ fn state(interface: NativeInterface, settings: Settings, serves: Name) -> Result
     }
     let settings = serde_json::Value::Object(others).to_string();
     let (following, peers) = (Following::default(), Peers::default());
-    Ok(NativeState { serves, description, parameters, settings, following, peers, open: None })
+    Ok(NativeState { serves, description, parameters, settings, following, peers, open: None, front: Front::default() })
 }
 
 struct Hosted {
