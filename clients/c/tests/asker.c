@@ -67,6 +67,13 @@ static rohrpost_outcome made(void *user) {
     return ROHRPOST_OK;
 }
 
+static rohrpost_outcome on(void *user) {
+    (void)user;
+    uint8_t *room;
+    DONE(rohrpost_module_begin(SMALL, 0, "\x01\x00", 2, 1, &room));
+    return rohrpost_module_abandon();
+}
+
 static rohrpost_outcome received(void *user, const rohrpost_followed *data) {
     (void)user;
     HOLDS(data->follow < 4 && data->number == 1 && data->stamp_ns > 0);
@@ -90,6 +97,7 @@ static rohrpost_outcome calls(void) {
     GIVES(ROHRPOST_NULL_POINTER, rohrpost_module_call("thermometer.0", 16, bytes, len, long_ns, NULL));
     GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", 16, bytes, len - 1, long_ns, &reply));
     GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", 99, NULL, 0, long_ns, &reply));
+    reply = rohrpost_decode("\x07", 1);
     GIVES(ROHRPOST_CONFIGURATION, rohrpost_module_call("nobody.0", 16, NULL, 0, long_ns, &reply));
     HOLDS(rohrpost_get_u8(&reply) == 0 && rohrpost_decoded(&reply) == ROHRPOST_MALFORMED);
     DONE(rohrpost_module_get("thermometer.0", 1, long_ns, &reply));
@@ -113,6 +121,7 @@ static rohrpost_outcome own(void) {
     GIVES(ROHRPOST_VALUE, rohrpost_module_set_parameter("share", "\x65", 1));
     GIVES(ROHRPOST_VALUE, rohrpost_module_set_parameter("share", "", 0));
     GIVES(ROHRPOST_NO_ITEM, rohrpost_module_set_parameter("speed", "\x46", 1));
+    value = rohrpost_decode("\x07", 1);
     GIVES(ROHRPOST_NO_ITEM, rohrpost_module_parameter("speed", &value));
     // It is written all the same: nothing is in it.
     HOLDS(rohrpost_get_u8(&value) == 0 && rohrpost_decoded(&value) == ROHRPOST_MALFORMED);
@@ -223,6 +232,7 @@ int main(int count, char **arguments) {
     module.settings = SETTINGS;
     module.setting_count = ROHRPOST_COUNT(SETTINGS);
     module.made = made;
+    module.on = on;
     module.received = received;
     module.command = command;
     return rohrpost_module_run(&module, count, (const char *const *)arguments);
