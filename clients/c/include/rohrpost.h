@@ -573,7 +573,7 @@ typedef struct rohrpost_ready {
 } rohrpost_ready;
 
 // A module. One thread calls all its functions, one at a time, with `user`; any of them may be null. None of them may
-// let an exception of C++ out, or leave by `longjmp`, `pthread_exit` or `pthread_cancel`: calls of Rust lie below them.
+// let an exception of C++ out, or leave by `longjmp`, `pthread_exit` or `pthread_cancel`: Rust has called them.
 typedef struct rohrpost_module {
   // What it offers.
   const struct rohrpost_interface *interface;
@@ -596,8 +596,8 @@ typedef struct rohrpost_module {
   void (*off)(void *user);
   // Once a period while it is on. If it fails, the module is switched off and in error; so it is with those below.
   rohrpost_outcome (*tick)(void *user);
-  // Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED`, when `arguments` cannot be read or
-  // are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the function
+  // Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED`, when `arguments` cannot be read
+  // or are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the function
   // or the interface does not have it, that there is no such function; the module goes on then. What a function's
   // own result says is no failure of it.
   rohrpost_outcome (*command)(void *user,
@@ -907,8 +907,8 @@ rohrpost_code rohrpost_receiver_open(struct rohrpost_node node,
 
 // Takes the most important package, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0:
 // for ever, which no signal ends (`rohrpost_wait` returns then); `ROHRPOST_NOTHING` when there is none. The package is
-// in hand until the next such call, whatever that returns, or until it is released or the receiver is closed. Its bytes
-// are aligned to nothing.
+// in hand until the next such call, whatever that returns, or until it is released or the receiver is closed. Its
+// bytes are aligned to nothing.
 rohrpost_code rohrpost_receive(struct rohrpost_receiver receiver, int64_t timeout_ns, struct rohrpost_package *package);
 
 // The same; before it sleeps, it looks again and again for `spin_ns`, which takes a whole processor.
@@ -1131,8 +1131,8 @@ rohrpost_code rohrpost_stream_record(struct rohrpost_stream_reader reader,
                                      uint64_t sequence,
                                      struct rohrpost_record *record);
 
-// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. `ROHRPOST_BUSY` while a record
-// is in hand: release it first. `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
+// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. `ROHRPOST_BUSY` while a
+// record is in hand: release it first. `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
 rohrpost_code rohrpost_stream_around(struct rohrpost_stream_reader reader,
                                      struct rohrpost_stamp at,
                                      struct rohrpost_records_around *records);

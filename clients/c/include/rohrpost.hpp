@@ -1,8 +1,8 @@
 // Rohrpost for C++17: thin wrappers around rohrpost.h that close what they open, and throw what fails.
 //
-// A handle belongs to the thread that opened it, so does its wrapper: it must be destroyed there. A package or record in
-// hand is given back by its own destructor, in the same thread and before that of its receiver or reader; while one is
-// in hand, its receiver or reader refuses (`ROHRPOST_BUSY`) to hand out another one.
+// A handle belongs to the thread that opened it, so does its wrapper: it must be destroyed there. A package or record
+// in hand is given back by its own destructor, in the same thread and before that of its receiver or reader; while one
+// is in hand, its receiver or reader refuses (`ROHRPOST_BUSY`) to hand out another one.
 
 #ifndef ROHRPOST_HPP
 #define ROHRPOST_HPP
@@ -215,7 +215,8 @@ public:
         check(rohrpost_stream_reader_open(node.handle(), stream, &handle_));
     }
 
-    // The next record that is there; none if the time has passed. What was lost before it is in `missed`. One at a time.
+    // The next record that is there; none if the time has passed. What was lost before it is in `missed`. One at a
+    // time.
     std::optional<Record> next(int64_t timeout_ns = -1) {
         rohrpost_record record;
         rohrpost_code code;

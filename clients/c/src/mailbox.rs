@@ -247,8 +247,8 @@ pub extern "C" fn rohrpost_receiver_open(
 
 /// Takes the most important package, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0:
 /// for ever, which no signal ends (`rohrpost_wait` returns then); `ROHRPOST_NOTHING` when there is none. The package is
-/// in hand until the next such call, whatever that returns, or until it is released or the receiver is closed. Its bytes
-/// are aligned to nothing.
+/// in hand until the next such call, whatever that returns, or until it is released or the receiver is closed. Its
+/// bytes are aligned to nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_receive(
     receiver: ReceiverHandle,

@@ -29,7 +29,7 @@ use std::ffi::{CString, c_char, c_int, c_void};
 pub type Outcome = i32;
 
 /// A module. One thread calls all its functions, one at a time, with `user`; any of them may be null. None of them may
-/// let an exception of C++ out, or leave by `longjmp`, `pthread_exit` or `pthread_cancel`: calls of Rust lie below them.
+/// let an exception of C++ out, or leave by `longjmp`, `pthread_exit` or `pthread_cancel`: Rust has called them.
 #[repr(C)]
 pub struct ModuleTable {
     /// What it offers.
@@ -53,8 +53,8 @@ pub struct ModuleTable {
     pub off: Option<unsafe extern "C" fn(user: *mut c_void)>,
     /// Once a period while it is on. If it fails, the module is switched off and in error; so it is with those below.
     pub tick: Option<unsafe extern "C" fn(user: *mut c_void) -> Outcome>,
-    /// Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED`, when `arguments` cannot be read or
-    /// are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the function
+    /// Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED`, when `arguments` cannot be read
+    /// or are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the function
     /// or the interface does not have it, that there is no such function; the module goes on then. What a function's
     /// own result says is no failure of it.
     pub command: Option<

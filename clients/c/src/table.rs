@@ -7,8 +7,8 @@
 //!  └───────────┴──────────────┴────────┴────────┘
 //! ```
 //!
-//! A table is its thread's own, so a look-up takes no lock. A place that is used again has another turn, and after 65 536
-//! of them it is not used any more: a closed handle leads to nothing for ever.
+//! A table is its thread's own, so a look-up takes no lock. A place that is used again has another turn, and after
+//! 65 536 of them it is not used any more: a closed handle leads to nothing for ever.
 
 use crate::code::Code;
 use crate::edge::say;

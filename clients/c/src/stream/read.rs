@@ -181,8 +181,8 @@ fn idle(reader: &mut ReaderObject) -> Result<&mut StreamReader, Code> {
     reader.free().ok_or_else(busy)
 }
 
-/// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. `ROHRPOST_BUSY` while a record
-/// is in hand: release it first. `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
+/// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. `ROHRPOST_BUSY` while a
+/// record is in hand: release it first. `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_around(
     reader: ReaderHandle,
