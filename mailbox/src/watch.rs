@@ -156,6 +156,11 @@ impl Watches {
         }
     }
 
+    /// Whether one was ready at the last look and was not told yet.
+    pub fn has_ready(&self) -> bool {
+        self.polls.iter().skip(1).any(|poll| poll.revents != 0)
+    }
+
     /// One that was ready at the last look; each is told once.
     pub fn next_ready(&mut self) -> Option<Ready> {
         let at = self.polls.iter().skip(1).position(|poll| poll.revents != 0)?;

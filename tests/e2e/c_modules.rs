@@ -213,7 +213,8 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
         &entry(
             "asker.0",
             &asker,
-            "calls = [\"thermometer.0\"]\nsettings = { share = 60, name = \"it\", list = [1, 2] }",
+            "calls = [\"thermometer.0\"]\nsettings = { share = 60, name = \"it\", list = [1, 2] }\n\
+             [module.stream.small]\nreaders = 1",
         ),
     ]);
     let checked = wait("it has heard of the temperature", || {
@@ -233,6 +234,18 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
     let bodies: Vec<&str> = records.lines().map(|line| line.rsplit_once("  ").unwrap().1).collect();
     let expected = ["{number: 7, bytes: [97, 98, 99]}", "{number: 8, bytes: [120, 121]}", "{number: 7, bytes: [122]}"];
     assert_eq!(bodies, expected, "{records}");
+    place.say(&["call", "asker.0", "fork"]).ok();
+    place.say(&["call", "asker.0", "fork"]).ok();
+    assert_eq!(robot.state("asker.0"), "on", "its children have given up nothing of it");
+    // Codes of calls in the function are its module's failures, and nothing that its caller did.
+    for (function, why) in [("typo", "there is no parameter `typo`"), ("bad_reply", "the bytes are not of this type")] {
+        let failed = place.say(&["call", "asker.0", function]).fails();
+        assert!(failed.contains(why) && !failed.contains("argument"), "{failed}");
+        assert_eq!(robot.state("asker.0"), "error");
+        for word in ["off", "on"] {
+            place.say(&["call", "asker.0", word]).ok();
+        }
+    }
     let failed = place.say(&["call", "asker.0", "fail"]).fails();
     assert!(failed.contains("it does not say why"), "{failed}");
     assert_eq!(robot.state("asker.0"), "error");
@@ -275,10 +288,15 @@ fn a_driver_in_c_gives_the_mapper_the_odometry_that_it_makes_of_a_serial_line() 
     assert!(refused.contains("`track-m` is 20 m, out of range: 0.01..=10 m"), "{refused}");
     let refused = place.say(&["param", "set", "odometry.0", "port", "/dev/null"]).fails();
     assert!(refused.contains("the port is opened when the module starts: restart it"), "{refused}");
+    // Whatever the line says: more than a number has room for, and differences of more.
+    for counts in ["99999999999999999999 1", "9223372036854775807 0", "-9223372036854775808 0"] {
+        writeln!(wheels.line, "{counts}").unwrap();
+    }
     writeln!(wheels.line, "no counts").unwrap();
     wait("a line that cannot be read is told", || {
         place.say(&["log"]).ok().contains("something that is not two counts").then_some(())
     });
+    assert_eq!(robot.state("odometry.0"), "on");
     drop(slave);
     stop(&place, robot, &mut launch);
 }

@@ -21,6 +21,7 @@ static const rohrpost_parameter PARAMETERS[] = {
 struct driver {
     int port;
     uint32_t watch;
+    bool has_ended;
     double count_m, track_m;
     // What came of the next line.
     char line[64];
@@ -76,6 +77,12 @@ static rohrpost_outcome made(void *user) {
     return rohrpost_module_watch(driver->port, ROHRPOST_READ, &driver->watch);
 }
 
+// Without its line it stays off.
+static rohrpost_outcome on(void *user) {
+    const struct driver *driver = (const struct driver *)user;
+    return driver->has_ended ? rohrpost_fail("the serial line has ended: restart this module") : ROHRPOST_OK;
+}
+
 // The first counts say where the wheels are; all others, how far they have turned since.
 static rohrpost_outcome counted(struct driver *driver, long left, long right) {
     rohrpost_time now;
@@ -85,8 +92,9 @@ static rohrpost_outcome counted(struct driver *driver, long left, long right) {
     }
     rohrpost_odometry *odometry = &driver->odometry;
     if (driver->counted_ns != 0) {
-        double left_m = (double)(left - driver->left) * driver->count_m;
-        double right_m = (double)(right - driver->right) * driver->count_m;
+        // Of numbers with a fraction: the difference of any two counts is one.
+        double left_m = ((double)left - (double)driver->left) * driver->count_m;
+        double right_m = ((double)right - (double)driver->right) * driver->count_m;
         double way_m = (left_m + right_m) / 2, turn_rad = (right_m - left_m) / driver->track_m;
         double middle_rad = odometry->pose.heading_rad + turn_rad / 2;
         odometry->pose.x_m += way_m * cos(middle_rad);
@@ -109,11 +117,20 @@ static rohrpost_outcome counted(struct driver *driver, long left, long right) {
     return outcome == ROHRPOST_OK ? rohrpost_module_publish(ROHRPOST_WHEELS_ODOMETRY, now.ns, bytes, len) : outcome;
 }
 
+// Two numbers, neither of which is too large.
+static bool two_counts(const char *line, long *left, long *right) {
+    char *first_end, *second_end;
+    errno = 0;
+    *left = strtol(line, &first_end, 10);
+    *right = strtol(first_end, &second_end, 10);
+    return errno == 0 && first_end != line && second_end != first_end;
+}
+
 static rohrpost_outcome line_came(struct driver *driver) {
     long left, right;
     driver->line[driver->line_len] = '\0';
     driver->line_len = 0;
-    if (sscanf(driver->line, "%ld %ld", &left, &right) == 2) {
+    if (two_counts(driver->line, &left, &right)) {
         return counted(driver, left, right);
     }
     return rohrpost_say(ROHRPOST_LEVEL_WARN, "the serial line says something that is not two counts");
@@ -125,6 +142,7 @@ static rohrpost_outcome ready(void *user, const rohrpost_ready *what) {
     ssize_t came = read(driver->port, bytes, sizeof bytes);
     if (came == 0 || (came < 0 && errno != EAGAIN && errno != EINTR)) {
         rohrpost_module_unwatch(what->watch);
+        driver->has_ended = true;
         return rohrpost_fail("the serial line has ended");
     }
     for (ssize_t at = 0; at < came; at++) {
@@ -148,6 +166,7 @@ int main(int count, char **arguments) {
     module.parameter_count = ROHRPOST_COUNT(PARAMETERS);
     module.user = &driver;
     module.made = made;
+    module.on = on;
     module.ready = ready;
     module.parameters_changed = parameters_changed;
     return rohrpost_module_run(&module, count, (const char *const *)arguments);

@@ -181,6 +181,9 @@ enum rohrpost_code
   ROHRPOST_FAULT = -29,
   // There is no such function, data, stream or parameter.
   ROHRPOST_NO_ITEM = -30,
+  // The ring of a stream cannot be used, now or at all: its seats are taken, its file is missing or damaged. The
+  // last error says which.
+  ROHRPOST_RING = -31,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -570,7 +573,7 @@ typedef struct rohrpost_ready {
 } rohrpost_ready;
 
 // A module. One thread calls all its functions, one at a time, with `user`; any of them may be null. None of them may
-// let an exception of C++ out.
+// let an exception of C++ out, or leave by `longjmp`, `pthread_exit` or `pthread_cancel`: Rust has called them.
 typedef struct rohrpost_module {
   // What it offers.
   const struct rohrpost_interface *interface;
@@ -593,9 +596,10 @@ typedef struct rohrpost_module {
   void (*off)(void *user);
   // Once a period while it is on. If it fails, the module is switched off and in error; so it is with those below.
   rohrpost_outcome (*tick)(void *user);
-  // Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED` tells the caller that the
-  // arguments cannot be read, `ROHRPOST_NO_ITEM` that there is no such function; the module goes on then. What a
-  // function's own result says is no failure of it.
+  // Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED`, when `arguments` cannot be read
+  // or are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the function
+  // or the interface does not have it, that there is no such function; the module goes on then. What a function's
+  // own result says is no failure of it.
   rohrpost_outcome (*command)(void *user,
                               uint16_t number,
                               struct rohrpost_decoder *arguments,
@@ -787,7 +791,8 @@ rohrpost_code rohrpost_interface_hash(const struct rohrpost_interface *interface
 const char *rohrpost_error_text(int32_t code);
 
 // What was wrong with the last call of this thread that returned a code below 0, in a sentence that names what it was
-// about. Valid until the next call that fails in this thread. Any thread.
+// about: read it at once. The next call that fails writes there, and so do calls that have more to say of
+// `ROHRPOST_NOTHING`, and the library before it calls a function of a module. Any thread.
 const char *rohrpost_last_error(void);
 
 // Begins to write values into `room` bytes. Any thread, as for all functions of encoders and decoders: they belong to
@@ -880,11 +885,11 @@ rohrpost_code rohrpost_send(struct rohrpost_sender sender,
                             size_t len);
 
 // Lends a slot of the mailbox to write a package in place: `body` is its place, of `room` bytes. Until it is sent by
-// `rohrpost_loan_send` or given up by `rohrpost_loan_drop`, the sender is busy.
+// `rohrpost_loan_send` or given up by `rohrpost_loan_drop`, the sender is busy. The place is aligned to nothing.
 rohrpost_code rohrpost_loan(struct rohrpost_sender sender, uint8_t priority, uint8_t **body, size_t *room);
 
 // Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent
-// then, also when this fails.
+// then, also when this fails, but for a null `label`.
 rohrpost_code rohrpost_loan_send(struct rohrpost_sender sender, const struct rohrpost_label *label, size_t len);
 
 // Gives up what is lent: nothing is sent.
@@ -901,8 +906,9 @@ rohrpost_code rohrpost_receiver_open(struct rohrpost_node node,
                                      struct rohrpost_receiver *receiver);
 
 // Takes the most important package, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0:
-// for ever; `ROHRPOST_NOTHING` when there is none. The package is in hand until the next package is taken, it is
-// released, or the receiver is closed.
+// for ever, which no signal ends (`rohrpost_wait` returns then); `ROHRPOST_NOTHING` when there is none. The package is
+// in hand until the next such call, whatever that returns, or until it is released or the receiver is closed. Its
+// bytes are aligned to nothing.
 rohrpost_code rohrpost_receive(struct rohrpost_receiver receiver, int64_t timeout_ns, struct rohrpost_package *package);
 
 // The same; before it sleeps, it looks again and again for `spin_ns`, which takes a whole processor.
@@ -977,8 +983,8 @@ rohrpost_code rohrpost_module_set_parameter(const char *name, const void *value,
 rohrpost_code rohrpost_module_publish(uint16_t number, uint64_t stamp_ns, const void *value, size_t len);
 
 // Runs a function of another module, `motor.0`, by its number: arguments are values one behind the other, and so is
-// the result, to be read from `reply`; it is there until the next such call. Waits for it at most `timeout_ns`, and
-// all else of the module with it. The first call asks the other one what it offers.
+// the result, to be read from `reply`; it is there until the next such call, and empty when this fails. Waits for it
+// at most `timeout_ns`, and all else of the module with it. The first call asks the other one what it offers.
 //
 // Pointers:
 // The text is null or ends with a zero; `arguments` is null, or points to `len` bytes.
@@ -1019,7 +1025,8 @@ rohrpost_code rohrpost_module_follow(const char *module,
                                      uint32_t *follow);
 
 // Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0,
-// and `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
+// and `room` becomes the place for `len` bytes: in shared memory, or, of a stream with records of 4096 bytes at most,
+// beside it, from where they are copied. It is aligned to nothing. Fill them, then `rohrpost_module_finish` or
 // `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
 //
 // Pointers:
@@ -1103,10 +1110,12 @@ rohrpost_code rohrpost_stream_reader_open(struct rohrpost_node node,
 // Closes a reader.
 rohrpost_code rohrpost_stream_reader_close(struct rohrpost_stream_reader reader);
 
-// Takes the next record, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0: for ever;
-// `ROHRPOST_NOTHING` when there is none. `ROHRPOST_LOST` when the writer has passed this reader: `lost`, which may be
-// null, is how many records; then call it again. The record is in hand until the next one is taken, it is released, or
-// the reader is closed; meanwhile the writer goes round it.
+// Takes the next record, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0: for ever,
+// which no signal ends (`rohrpost_wait` returns then); `ROHRPOST_NOTHING` when there is none. `ROHRPOST_LOST` when the
+// writer has passed this reader: `lost`, which may be null, is how many records; then call it again.
+//
+// The record is in hand until the next call that takes one from this reader, whatever that returns, or until it is
+// released or the reader is closed; meanwhile the writer goes round it. Its bytes are aligned to nothing.
 rohrpost_code rohrpost_stream_next(struct rohrpost_stream_reader reader,
                                    int64_t timeout_ns,
                                    struct rohrpost_record *record,
@@ -1122,8 +1131,8 @@ rohrpost_code rohrpost_stream_record(struct rohrpost_stream_reader reader,
                                      uint64_t sequence,
                                      struct rohrpost_record *record);
 
-// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. What is in hand is released.
-// `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
+// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. `ROHRPOST_BUSY` while a
+// record is in hand: release it first. `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
 rohrpost_code rohrpost_stream_around(struct rohrpost_stream_reader reader,
                                      struct rohrpost_stamp at,
                                      struct rohrpost_records_around *records);
@@ -1131,7 +1140,8 @@ rohrpost_code rohrpost_stream_around(struct rohrpost_stream_reader reader,
 // Lets the writer have the place of the record in hand, if there is one.
 rohrpost_code rohrpost_stream_reader_release(struct rohrpost_stream_reader reader);
 
-// How many records this reader did not get since it was opened, by cause. What is in hand is released.
+// How many records this reader did not get since it was opened, by cause. `ROHRPOST_BUSY` while a record is in hand:
+// release it first.
 rohrpost_code rohrpost_stream_missed(struct rohrpost_stream_reader reader, struct rohrpost_records_missed *missed);
 
 // Makes this process the writer of a stream; with a null `shape`, of the usual one. Records that an earlier writer
@@ -1160,7 +1170,7 @@ rohrpost_code rohrpost_stream_write(struct rohrpost_stream_writer writer,
 
 // Begins a record that is written in place: `body` is its place, of `room` bytes, where anything may stand. Readers
 // see it when it is finished by `rohrpost_stream_finish`; until then, or until `rohrpost_stream_abandon`, the writer
-// is busy.
+// is busy. The place is aligned to nothing.
 rohrpost_code rohrpost_stream_begin(struct rohrpost_stream_writer writer,
                                     struct rohrpost_stamp at,
                                     uint8_t **body,
@@ -1182,10 +1192,10 @@ rohrpost_code rohrpost_watch(struct rohrpost_node node, int descriptor, uint8_t 
 // Watches it no longer. Thread: that of the node.
 rohrpost_code rohrpost_unwatch(struct rohrpost_node node, uint32_t watch);
 
-// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has
-// passed (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what
-// came at the last moment is there too: take from each what is there, and wait again. What has a package or record in
-// hand cannot be waited for: release it first.
+// Waits until one of `count` mailboxes and streams has something or a watched descriptor is ready, at most
+// `timeout_ns`, 0: not at all, below 0: for ever; `ROHRPOST_NOTHING` when nothing is there then. It may return early
+// for no reason, also for a signal: take from each what is there, and wait again. What has a package or record in hand
+// cannot be waited for: release it first.
 //
 // Thread: that of the node and of all sources, which were opened by this node.
 //
@@ -1195,6 +1205,9 @@ rohrpost_code rohrpost_wait(struct rohrpost_node node,
                             const struct rohrpost_source *sources,
                             size_t count,
                             int64_t timeout_ns);
+
+// `ROHRPOST_BUSY` while a package or record of this receiver or reader is in hand. Thread: that of the source.
+rohrpost_code rohrpost_source_idle(struct rohrpost_source source);
 
 // Tells a descriptor that was ready when `rohrpost_wait` returned; each is told once, then `ROHRPOST_NOTHING`. Thread:
 // that of the node.

@@ -1,13 +1,15 @@
 // Rohrpost for C++17: thin wrappers around rohrpost.h that close what they open, and throw what fails.
 //
-// A handle belongs to the thread that opened it, so does its wrapper. What is in hand (a package, a record, a loan)
-// belongs to its wrapper, which must outlive it, and is given back by its own destructor.
+// A handle belongs to the thread that opened it, so does its wrapper: it must be destroyed there. A package or record
+// in hand is given back by its own destructor, in the same thread and before that of its receiver or reader; while one
+// is in hand, its receiver or reader refuses (`ROHRPOST_BUSY`) to hand out another one.
 
 #ifndef ROHRPOST_HPP
 #define ROHRPOST_HPP
 
 #include "rohrpost.h"
 
+#include <chrono>
 #include <exception>
 #include <optional>
 #include <stdexcept>
@@ -150,9 +152,10 @@ public:
         check(rohrpost_receiver_open(node.handle(), name, shape, &handle_));
     }
 
-    // None if the time has passed.
+    // None if the time has passed. One at a time.
     std::optional<Package> receive(int64_t timeout_ns = -1) {
         rohrpost_package package;
+        check(rohrpost_source_idle(source()));
         if (!check(rohrpost_receive(handle_, timeout_ns, &package))) {
             return std::nullopt;
         }
@@ -162,7 +165,8 @@ public:
     // Closes it and removes its mailbox; how many packages waited there.
     size_t remove() {
         size_t lost;
-        check(rohrpost_receiver_remove(std::exchange(handle_, rohrpost_receiver{0}), &lost));
+        check(rohrpost_receiver_remove(handle_, &lost));
+        handle_ = rohrpost_receiver{0};
         return lost;
     }
 
@@ -211,19 +215,27 @@ public:
         check(rohrpost_stream_reader_open(node.handle(), stream, &handle_));
     }
 
-    // The next record that is there; none if the time has passed. What was lost before it is in `missed`.
+    // The next record that is there; none if the time has passed. What was lost before it is in `missed`. One at a
+    // time.
     std::optional<Record> next(int64_t timeout_ns = -1) {
         rohrpost_record record;
         rohrpost_code code;
-        do {
-            code = rohrpost_stream_next(handle_, timeout_ns, &record, nullptr);
-        } while (code == ROHRPOST_LOST);
+        check(rohrpost_source_idle(source()));
+        const auto began = std::chrono::steady_clock::now();
+        int64_t left_ns = timeout_ns;
+        while ((code = rohrpost_stream_next(handle_, left_ns, &record, nullptr)) == ROHRPOST_LOST) {
+            if (timeout_ns > 0) {
+                const std::chrono::nanoseconds passed = std::chrono::steady_clock::now() - began;
+                left_ns = passed.count() < timeout_ns ? timeout_ns - passed.count() : 0;
+            }
+        }
         return in_hand(code, record);
     }
 
     // The newest record; none before the first.
     std::optional<Record> newest() {
         rohrpost_record record;
+        check(rohrpost_source_idle(source()));
         return in_hand(rohrpost_stream_newest(handle_, &record), record);
     }
 

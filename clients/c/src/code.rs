@@ -3,7 +3,7 @@
 use rohrpost_config::{Errors, NameTextError};
 use rohrpost_mailbox::{CreateError, NodeError, SendError, StreamError, WriteError};
 use rohrpost_modules::parameter::Refusal;
-use rohrpost_modules::runtime::{ContextError, RecordError};
+use rohrpost_modules::runtime::{ContextError, RecordError, StreamReadError};
 use rohrpost_native::{CallError, NativeError};
 use std::ffi::CStr;
 use std::fmt::Display;
@@ -78,10 +78,13 @@ pub enum Code {
     Fault = -29,
     /// There is no such function, data, stream or parameter.
     NoItem = -30,
+    /// The ring of a stream cannot be used, now or at all: its seats are taken, its file is missing or damaged. The
+    /// last error says which.
+    Ring = -31,
 }
 
 /// Words for each code.
-const TEXTS: [(Code, &CStr); 33] = [
+const TEXTS: [(Code, &CStr); 34] = [
     (Code::Ok, c"done"),
     (Code::Nothing, c"nothing is there"),
     (Code::Lost, c"records were lost"),
@@ -115,6 +118,7 @@ const TEXTS: [(Code, &CStr); 33] = [
     (Code::Timeout, c"no answer in time"),
     (Code::Fault, c"the other module did not run it"),
     (Code::NoItem, c"no such function, data, stream or parameter"),
+    (Code::Ring, c"the stream's ring cannot be used"),
 ];
 
 /// Words for a number, which may be no code.
@@ -214,7 +218,7 @@ impl Coded for NativeError {
         match self {
             Self::Context(error) => error.code(),
             Self::Call(error) => error.code(),
-            Self::Read(_) => Code::Damaged,
+            Self::Read(error) => error.code(),
             Self::NoItem { .. } | Self::NoStream { .. } | Self::NoNumber(_) => Code::NoItem,
             Self::RecordOpen => Code::Busy,
             Self::NoRecordOpen => Code::Value,
@@ -230,10 +234,20 @@ impl Coded for ContextError {
             Self::Record(RecordError::TooLarge { .. }) => Code::TooLarge,
             Self::Record(RecordError::Late { .. } | RecordError::OldEpoch { .. }) => Code::Late,
             Self::Record(_) | Self::Encode(..) => Code::Value,
-            Self::Read(_) => Code::Damaged,
+            Self::Read(error) => error.code(),
             Self::TooMany => Code::Crowded,
             Self::NotStoodIn { .. } => Code::NoItem,
             _ => Code::Configuration,
+        }
+    }
+}
+
+impl Coded for StreamReadError {
+    fn code(&self) -> Code {
+        match self {
+            Self::Ring(_) => Code::Ring,
+            Self::InterfaceDiffers { .. } => Code::OtherVersion,
+            Self::Unreadable(_) => Code::Malformed,
         }
     }
 }

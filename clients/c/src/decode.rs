@@ -18,6 +18,18 @@ pub struct Decoder {
     pub state: i32,
 }
 
+impl Decoder {
+    /// Whether what was read is not of its type, or something is left behind it.
+    pub(crate) fn is_malformed(&self) -> bool {
+        self.state != Code::Ok as i32 || self.left > 0
+    }
+}
+
+/// Of what is not there: nothing can be read from it.
+pub(crate) fn none() -> Decoder {
+    Decoder { state: Code::Malformed as i32, ..decoder(&[]) }
+}
+
 /// To read these bytes.
 pub(crate) fn decoder(bytes: &[u8]) -> Decoder {
     Decoder { bytes: bytes.as_ptr(), left: bytes.len(), state: Code::Ok as i32 }
@@ -25,8 +37,12 @@ pub(crate) fn decoder(bytes: &[u8]) -> Decoder {
 
 fn get<'a, T: Deserialize<'a>>(decoder: Option<&mut Decoder>) -> Option<T> {
     let decoder = decoder.filter(|decoder| decoder.state == Code::Ok as i32)?;
-    // SAFETY: `rohrpost_decode` was given these bytes, which stay as they are while they are read; `left` are left.
-    let left = unsafe { std::slice::from_raw_parts(decoder.bytes, decoder.left) };
+    let left = match decoder.bytes.is_null() {
+        // A decoder of zeros, which C may make.
+        true => &[][..],
+        // SAFETY: `rohrpost_decode` was given these bytes, which stay as they are while they are read; `left` are left.
+        false => unsafe { std::slice::from_raw_parts(decoder.bytes, decoder.left) },
+    };
     match postcard::take_from_bytes(left) {
         Ok((value, rest)) => {
             (decoder.bytes, decoder.left) = (rest.as_ptr(), rest.len());

@@ -5,6 +5,7 @@ use rohrpost_mailbox::Waiting;
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_void};
 use std::fmt::{Arguments, Write};
+use std::io::Write as _;
 use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
@@ -14,6 +15,8 @@ const MESSAGE_BYTES: usize = 1024;
 
 /// What a call of this thread said last when it failed.
 struct Message {
+    /// How often this thread has said something.
+    count: u32,
     len: usize,
     bytes: [u8; MESSAGE_BYTES],
 }
@@ -31,16 +34,18 @@ impl Write for Message {
 }
 
 thread_local! {
-    static LAST: RefCell<Message> = const { RefCell::new(Message { len: 0, bytes: [0; MESSAGE_BYTES] }) };
+    static LAST: RefCell<Message> = const { RefCell::new(Message { count: 0, len: 0, bytes: [0; MESSAGE_BYTES] }) };
 }
 
-/// Keeps the words of a failure for this thread.
+/// Keeps the words of a failure for this thread; in a handler of signals that has interrupted just this, none.
 pub(crate) fn say(code: Code, words: Arguments<'_>) -> Code {
-    LAST.with_borrow_mut(|last| {
-        last.len = 0;
+    LAST.with(|last| {
+        let Ok(mut last) = last.try_borrow_mut() else { return };
+        (last.count, last.len) = (last.count.wrapping_add(1), 0);
         // It takes all, and cuts what is too long.
         let _ = last.write_fmt(words);
-        last.bytes[last.len] = 0;
+        let end = last.len;
+        last.bytes[end] = 0;
     });
     code
 }
@@ -57,16 +62,29 @@ pub extern "C" fn rohrpost_error_text(code: i32) -> *const c_char {
 }
 
 /// What was wrong with the last call of this thread that returned a code below 0, in a sentence that names what it was
-/// about. Valid until the next call that fails in this thread. Any thread.
+/// about: read it at once. The next call that fails writes there, and so do calls that have more to say of
+/// `ROHRPOST_NOTHING`, and the library before it calls a function of a module. Any thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_last_error() -> *const c_char {
-    // Nothing of this thread writes there while C reads it, until the next call fails.
-    LAST.with_borrow(|last| last.bytes.as_ptr().cast())
+    // Nothing of this thread writes there while C reads it, until the next call fails. Only an address: a handler of
+    // signals may ask for it while a call writes.
+    LAST.with(|last| last.as_ptr().wrapping_byte_add(std::mem::offset_of!(Message, bytes)).cast())
 }
 
 /// What was wrong with the last call that failed in this thread.
 pub(crate) fn last_words() -> String {
-    LAST.with_borrow(|last| String::from_utf8_lossy(&last.bytes[..last.len]).into_owned())
+    let words = |last: &Message| String::from_utf8_lossy(&last.bytes[..last.len]).into_owned();
+    LAST.with(|last| last.try_borrow().map(|last| words(&last)).unwrap_or_default())
+}
+
+/// Says a line on the standard error, if there still is one.
+pub(crate) fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// How often this thread has said something.
+pub(crate) fn said() -> u32 {
+    LAST.with(|last| last.try_borrow().map_or(0, |last| last.count))
 }
 
 /// Runs a call: what it returns becomes a code, and so does a panic.
@@ -159,4 +177,24 @@ pub(crate) unsafe fn bytes_to(bytes: &[u8], buffer: *mut c_char, size: usize) ->
         buffer.add(bytes.len()).write(0);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LAST, edge, last_words, rohrpost_last_error, say};
+    use crate::code::Code;
+
+    #[test]
+    fn a_call_in_a_handler_that_has_interrupted_another_ones_failure_ends_with_its_code() {
+        let before = say(Code::Value, format_args!("before"));
+        assert_eq!((before, last_words().as_str()), (Code::Value, "before"));
+        LAST.with_borrow_mut(|_| {
+            assert_eq!(edge(|| Err(say(Code::Full, format_args!("in the handler")))), Code::Full);
+            assert!(!rohrpost_last_error().is_null());
+        });
+        assert_eq!(last_words(), "before");
+        // SAFETY: a zero ends it, and nothing is said meanwhile.
+        let text = unsafe { std::ffi::CStr::from_ptr(rohrpost_last_error()) };
+        assert_eq!(text, c"before");
+    }
 }

@@ -37,8 +37,13 @@ impl Encoder {
             return;
         }
         let left = self.room.saturating_sub(self.len);
-        // SAFETY: `rohrpost_encode` was given so many bytes, which are the caller's alone; those behind `len` are left.
-        let room = unsafe { std::slice::from_raw_parts_mut(self.bytes.wrapping_add(self.room - left), left) };
+        let room = match self.bytes.is_null() {
+            // An encoder of zeros, which C may make.
+            true => &mut [][..],
+            // SAFETY: `rohrpost_encode` was given so many bytes, which are the caller's alone; those behind `len` are
+            // left.
+            false => unsafe { std::slice::from_raw_parts_mut(self.bytes.wrapping_add(self.room - left), left) },
+        };
         match write(room) {
             Some(len) => self.len += len,
             None => self.state = Code::SmallBuffer as i32,

@@ -28,13 +28,6 @@ impl<T, B> Lender<T, B> {
         Some(unsafe { self.value.as_mut() })
     }
 
-    /// The value; what was lent is given back.
-    pub(crate) fn back(&mut self) -> &mut T {
-        self.lent = None;
-        // SAFETY: the box is this lender's own, and nothing is borrowed from it by now.
-        unsafe { self.value.as_mut() }
-    }
-
     /// Lends something of the value, in place of what was lent before.
     ///
     /// # Safety

@@ -12,16 +12,19 @@
 //!   a fork is a code, whatever else is there by now.
 //! - **Threads.** A handle belongs to the thread that opened it; other threads open their own. Functions without a
 //!   handle may be called by any thread. What a thread has not closed is closed when it ends.
-//! - **Fork.** A child process cannot use what its parent has opened: the parent's locks say that the parent lives. It
-//!   gets a code, and should call `exec`.
-//! - **Memory** that a call hands out lies in shared memory, and is valid until the next call that takes from the same
-//!   handle, gives it back, or closes it. No call keeps a pointer that it was given.
+//! - **Fork.** A child process cannot use what its parent has opened, nor be its module: the parent's locks say that
+//!   the parent lives. It gets a code, and should call `exec` or `_exit`; one that returns from a function of a module
+//!   ends.
+//! - **Memory** that a call hands out lies in shared memory, aligned to nothing, and is valid until the next call that
+//!   takes from the same handle, whatever that returns, gives it back, or closes it. No call keeps a pointer that it
+//!   was given.
 
 pub mod code;
 pub mod decode;
 pub mod description;
 pub mod edge;
 pub mod encode;
+mod fork;
 mod lender;
 pub mod mailbox;
 pub mod module;

@@ -172,7 +172,7 @@ pub unsafe extern "C" fn rohrpost_send(
 }
 
 /// Lends a slot of the mailbox to write a package in place: `body` is its place, of `room` bytes. Until it is sent by
-/// `rohrpost_loan_send` or given up by `rohrpost_loan_drop`, the sender is busy.
+/// `rohrpost_loan_send` or given up by `rohrpost_loan_drop`, the sender is busy. The place is aligned to nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_loan(
     sender: SenderHandle,
@@ -195,7 +195,7 @@ pub extern "C" fn rohrpost_loan(
 }
 
 /// Sends the first `len` bytes of what is lent. The priority is the one that it was lent for. It is no longer lent
-/// then, also when this fails.
+/// then, also when this fails, but for a null `label`.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_loan_send(sender: SenderHandle, label: Option<&PackageLabel>, len: usize) -> Code {
     edge(|| {
@@ -246,8 +246,9 @@ pub extern "C" fn rohrpost_receiver_open(
 }
 
 /// Takes the most important package, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0:
-/// for ever; `ROHRPOST_NOTHING` when there is none. The package is in hand until the next package is taken, it is
-/// released, or the receiver is closed.
+/// for ever, which no signal ends (`rohrpost_wait` returns then); `ROHRPOST_NOTHING` when there is none. The package is
+/// in hand until the next such call, whatever that returns, or until it is released or the receiver is closed. Its
+/// bytes are aligned to nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_receive(
     receiver: ReceiverHandle,

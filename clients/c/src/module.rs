@@ -12,8 +12,9 @@ pub use in_place::*;
 use crate::code::Code;
 use crate::decode::{Decoder, decoder};
 use crate::description::{InterfaceTable, ParameterTable, described, list, parameters};
-use crate::edge::{edge, given, last_words, needed_text, say, text};
+use crate::edge::{edge, given, last_words, needed_text, said, say, tell, text};
 use crate::encode::{Encoder, encoder};
+use crate::fork;
 use crate::waiting::ReadyDescriptor;
 use current::entered;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Ready};
@@ -28,7 +29,7 @@ use std::ffi::{CString, c_char, c_int, c_void};
 pub type Outcome = i32;
 
 /// A module. One thread calls all its functions, one at a time, with `user`; any of them may be null. None of them may
-/// let an exception of C++ out.
+/// let an exception of C++ out, or leave by `longjmp`, `pthread_exit` or `pthread_cancel`: Rust has called them.
 #[repr(C)]
 pub struct ModuleTable {
     /// What it offers.
@@ -52,9 +53,10 @@ pub struct ModuleTable {
     pub off: Option<unsafe extern "C" fn(user: *mut c_void)>,
     /// Once a period while it is on. If it fails, the module is switched off and in error; so it is with those below.
     pub tick: Option<unsafe extern "C" fn(user: *mut c_void) -> Outcome>,
-    /// Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED` tells the caller that the
-    /// arguments cannot be read, `ROHRPOST_NO_ITEM` that there is no such function; the module goes on then. What a
-    /// function's own result says is no failure of it.
+    /// Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED`, when `arguments` cannot be read
+    /// or are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the function
+    /// or the interface does not have it, that there is no such function; the module goes on then. What a function's
+    /// own result says is no failure of it.
     pub command: Option<
         unsafe extern "C" fn(user: *mut c_void, number: u16, arguments: *mut Decoder, reply: *mut Encoder) -> Outcome,
     >,
@@ -98,6 +100,7 @@ pub unsafe extern "C" fn rohrpost_module_run(
     arguments: *const *const c_char,
 ) -> c_int {
     let mut code = 1;
+    fork::watch();
     // As in each program of Rust: when launch has died, nobody reads what the module prints, and it still has to go to
     // its safe state.
     // SAFETY: no handler of anybody's is called from now on.
@@ -114,7 +117,7 @@ pub unsafe extern "C" fn rohrpost_module_run(
         Ok(())
     });
     if ended != Code::Ok {
-        eprintln!("{}", last_words());
+        tell(&last_words());
     }
     code
 }
@@ -203,6 +206,7 @@ impl NativeModule for CModule<'_> {
         let command = self.table.command.ok_or_else(unknown)?;
         let (mut read, mut written) = (decoder(arguments), encoder(&mut self.reply));
         say(Code::Failed, format_args!("it does not say why"));
+        let said_before = said();
         // SAFETY: the author's function, with the author's argument; both others outlive the call.
         let outcome = entered(context, || unsafe { command(self.table.user, number, &mut read, &mut written) });
         let result = match outcome {
@@ -214,8 +218,11 @@ impl NativeModule for CModule<'_> {
                 reply.extend_from_slice(&self.reply[..len.min(BODY_BYTES_MAX)]);
                 Ok(())
             }
-            Err(outcome) if outcome == Code::NoItem as i32 => Err(unknown()),
-            Err(outcome) if outcome == Code::Malformed as i32 => {
+            // The same codes of another call, which has failed in the function, are failures of the module.
+            Err(outcome) if outcome == Code::NoItem as i32 && (!context.offers(number) || said() == said_before) => {
+                Err(unknown())
+            }
+            Err(outcome) if outcome == Code::Malformed as i32 && read.is_malformed() => {
                 Err(CommandFailure::Fault(Fault::Arguments(last_words())))
             }
             Err(_) => Err(CommandFailure::Module(ModuleError::new(last_words()))),

@@ -7,14 +7,14 @@
 //!  └───────────┴──────────────┴────────┴────────┘
 //! ```
 //!
-//! A table is its thread's own, so a look-up takes no lock. A place that is used again has another turn, so a closed
-//! handle is found until its place was used 65 536 times.
+//! A table is its thread's own, so a look-up takes no lock. A place that is used again has another turn, and after
+//! 65 536 of them it is not used any more: a closed handle leads to nothing for ever.
 
 use crate::code::Code;
 use crate::edge::say;
+use crate::fork;
 use crate::objects::{Kind, Object};
 use std::cell::RefCell;
-use std::sync::Once;
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
 /// Places of a table.
@@ -22,23 +22,19 @@ const PLACES_MAX: usize = 1 << 16;
 /// Threads are told apart by so many bits.
 const THREAD_MASK: u32 = (1 << 24) - 1;
 
-/// How often this process became a child by `fork`: what was opened before that is its parent's.
-static FORKS: AtomicU32 = AtomicU32::new(0);
 /// What a child has of its parent, never dropped. Here, for programs that look for memory which nobody knows any more.
 static OF_PARENT: AtomicPtr<Vec<Place>> = AtomicPtr::new(std::ptr::null_mut());
 /// The last thread that was counted.
 static THREADS: AtomicU32 = AtomicU32::new(0);
 
-extern "C" fn count_fork() {
-    FORKS.fetch_add(1, Ordering::Relaxed);
-}
-
 struct Place {
     turn: u16,
+    /// Its turns are used up: never again, so that no old handle finds another's object.
+    is_spent: bool,
     object: Option<Object>,
 }
 
-struct Table {
+pub(crate) struct Table {
     thread: u32,
     forks: u32,
     places: Vec<Place>,
@@ -50,10 +46,7 @@ thread_local! {
 
 impl Table {
     fn new() -> Self {
-        static WATCH_FORKS: Once = Once::new();
-        // SAFETY: the function only changes an atomic, which a child of a process with threads may do. (Without memory
-        // for it, forks go unseen, and so does everything else soon.)
-        WATCH_FORKS.call_once(|| _ = unsafe { libc::pthread_atfork(None, None, Some(count_fork)) });
+        fork::watch();
         // Not 0, with which no handle begins.
         let thread = loop {
             match THREADS.fetch_add(1, Ordering::Relaxed) & THREAD_MASK {
@@ -61,21 +54,21 @@ impl Table {
                 thread => break thread,
             }
         };
-        Self { thread, forks: FORKS.load(Ordering::Relaxed), places: Vec::new() }
+        Self { thread, forks: fork::forks(), places: Vec::new() }
     }
 
     fn is_forked(&self) -> bool {
-        self.forks != FORKS.load(Ordering::Relaxed)
+        self.forks != fork::forks()
     }
 
     fn store(&mut self, object: Object, kind: u8) -> Result<u64, Code> {
-        let free = self.places.iter().position(|place| place.object.is_none());
+        let free = self.places.iter().position(|place| place.object.is_none() && !place.is_spent);
         let index = free.unwrap_or(self.places.len());
         if index == PLACES_MAX {
             return Err(say(Code::Crowded, format_args!("this thread has {PLACES_MAX} open handles; close some")));
         }
         if free.is_none() {
-            self.places.push(Place { turn: 0, object: None });
+            self.places.push(Place { turn: 0, is_spent: false, object: None });
         }
         let place = &mut self.places[index];
         place.object = Some(object);
@@ -92,6 +85,12 @@ impl Table {
         }
         let place = self.places.get_mut((handle & 0xffff) as usize);
         place.filter(|place| place.object.is_some() && place.turn == (handle >> 24) as u16).ok_or_else(closed::<K>)
+    }
+
+    /// What a handle stands for.
+    #[inline]
+    pub(crate) fn find<K: Kind>(&mut self, handle: u64) -> Result<&mut K, Code> {
+        self.place::<K>(handle)?.object.as_mut().and_then(K::find).ok_or_else(closed::<K>)
     }
 
     #[cold]
@@ -128,7 +127,7 @@ impl Drop for Table {
 }
 
 /// Uses this thread's table; not while it is used, as a handler of signals would.
-fn with_table<T>(use_it: impl FnOnce(&mut Table) -> Result<T, Code>) -> Result<T, Code> {
+pub(crate) fn with_table<T>(use_it: impl FnOnce(&mut Table) -> Result<T, Code>) -> Result<T, Code> {
     let used = TABLE.try_with(|table| match table.try_borrow_mut() {
         Ok(mut table) => use_it(&mut table),
         Err(_) => Err(say(Code::Busy, format_args!("another call of this thread goes on: is this a signal handler?"))),
@@ -152,17 +151,21 @@ pub(crate) fn is_a<K: Kind>(handle: u64) -> bool {
 /// Uses what a handle stands for.
 #[inline]
 pub(crate) fn with<K: Kind, T>(handle: u64, use_it: impl FnOnce(&mut K) -> Result<T, Code>) -> Result<T, Code> {
-    with_table(|table| {
-        let object = table.place::<K>(handle)?.object.as_mut().and_then(K::find);
-        use_it(object.ok_or_else(closed::<K>)?)
-    })
+    with_table(|table| use_it(table.find(handle)?))
 }
 
 /// Closes a handle, and gives what it stood for.
 pub(crate) fn close<K: Kind>(handle: u64) -> Result<K, Code> {
     with_table(|table| {
         let place = table.place::<K>(handle)?;
-        place.turn = place.turn.wrapping_add(1);
+        if place.object.as_mut().and_then(K::find).is_none() {
+            // A handle that nobody was given: its number says another kind than that of the object.
+            return Err(closed::<K>());
+        }
+        match place.turn.checked_add(1) {
+            Some(turn) => place.turn = turn,
+            None => place.is_spent = true,
+        }
         place.object.take().and_then(K::take).ok_or_else(closed::<K>)
     })
 }

@@ -4,7 +4,7 @@ use crate::code::Code;
 use crate::edge::{edge, failed, place, say, waiting};
 use crate::node::NodeHandle;
 use crate::objects::{NodeObject, ReaderObject, ReceiverObject};
-use crate::table;
+use crate::table::{self, Table};
 use arrayvec::ArrayVec;
 use rohrpost_mailbox::{Interest, Participant, Source, Watch, Watches, wait_any};
 use std::ffi::c_int;
@@ -107,10 +107,10 @@ pub extern "C" fn rohrpost_unwatch(node: NodeHandle, watch: u32) -> Code {
     })
 }
 
-/// Waits until one of `count` mailboxes and streams has something, a watched descriptor is ready, or the time has
-/// passed (`ROHRPOST_NOTHING`): at most `timeout_ns`, below 0 for ever. It may return early for no reason, and what
-/// came at the last moment is there too: take from each what is there, and wait again. What has a package or record in
-/// hand cannot be waited for: release it first.
+/// Waits until one of `count` mailboxes and streams has something or a watched descriptor is ready, at most
+/// `timeout_ns`, 0: not at all, below 0: for ever; `ROHRPOST_NOTHING` when nothing is there then. It may return early
+/// for no reason, also for a signal: take from each what is there, and wait again. What has a package or record in hand
+/// cannot be waited for: release it first.
 ///
 /// Thread: that of the node and of all sources, which were opened by this node.
 ///
@@ -130,43 +130,55 @@ pub unsafe extern "C" fn rohrpost_wait(
         // SAFETY: the caller's promise; a `WaitSource` is as large as its number.
         let bytes = unsafe { crate::edge::bytes(sources.cast(), count * size_of::<WaitSource>(), "sources") }?;
         let ids = || bytes.chunks_exact(8).filter_map(|id| id.first_chunk()).map(|id| u64::from_ne_bytes(*id));
-        let participant = table::with(node.id, |node: &mut NodeObject| Ok(node.participant.clone()))?;
-        let mut pointers = ArrayVec::<*mut dyn Source, ROHRPOST_SOURCES_MAX>::new();
-        for (at, id) in ids().enumerate() {
-            if ids().take(at).any(|other| other == id) {
-                return Err(say(Code::Value, format_args!("source {at} is there twice")));
+        // In one use of the table: a handler of signals can close nothing meanwhile.
+        table::with_table(|table| {
+            let participant = table.find::<NodeObject>(node.id)?.participant.clone();
+            let mut pointers = ArrayVec::<*mut dyn Source, ROHRPOST_SOURCES_MAX>::new();
+            for (at, id) in ids().enumerate() {
+                if ids().take(at).any(|other| other == id) {
+                    return Err(say(Code::Value, format_args!("source {at} is there twice")));
+                }
+                pointers.push(source(table, id, &participant)?);
             }
-            pointers.push(source(id, &participant)?);
-        }
-        table::with(node.id, |node: &mut NodeObject| {
-            // SAFETY: each points to what a handle of this thread owns, all are different, nothing is borrowed from
-            // them, and nothing else of this thread runs while the table is used.
+            // SAFETY: each points to what a handle of this thread owns, at an address of its own; all are different,
+            // nothing is borrowed from them, and nothing else of this thread uses the table meanwhile.
             let mut sources: ArrayVec<&mut dyn Source, ROHRPOST_SOURCES_MAX> =
                 pointers.iter().map(|pointer| unsafe { &mut **pointer }).collect();
-            wait(node, &mut sources, timeout_ns)
+            wait(table.find(node.id)?, &mut sources, timeout_ns)
         })
     })
 }
 
+/// `ROHRPOST_BUSY` while a package or record of this receiver or reader is in hand. Thread: that of the source.
+#[unsafe(no_mangle)]
+pub extern "C" fn rohrpost_source_idle(source: WaitSource) -> Code {
+    edge(|| {
+        let is_idle = match table::is_a::<ReaderObject>(source.id) {
+            true => table::with(source.id, |reader: &mut ReaderObject| Ok(reader.free().is_some())),
+            false => table::with(source.id, |receiver: &mut ReceiverObject| Ok(receiver.free().is_some())),
+        }?;
+        if is_idle { Ok(()) } else { Err(busy()) }
+    })
+}
+
+fn busy() -> Code {
+    say(Code::Busy, format_args!("a source has something in hand: release it first"))
+}
+
 /// Where the receiver or reader of a handle is.
-fn source(id: u64, participant: &Arc<Participant>) -> Result<*mut dyn Source, Code> {
+fn source(table: &mut Table, id: u64, participant: &Arc<Participant>) -> Result<*mut dyn Source, Code> {
     let own = |other: &Arc<Participant>| match Arc::ptr_eq(other, participant) {
         true => Ok(()),
         false => Err(say(Code::Value, format_args!("a source was opened by another node than this one"))),
     };
-    let busy = || say(Code::Busy, format_args!("a source has something in hand: release it first"));
     if table::is_a::<ReaderObject>(id) {
-        table::with(id, |reader: &mut ReaderObject| {
-            let reader = reader.free().ok_or_else(busy)?;
-            own(reader.participant())?;
-            Ok(std::ptr::from_mut(reader) as *mut dyn Source)
-        })
+        let reader = table.find::<ReaderObject>(id)?.free().ok_or_else(busy)?;
+        own(reader.participant())?;
+        Ok(std::ptr::from_mut(reader) as *mut dyn Source)
     } else {
-        table::with(id, |receiver: &mut ReceiverObject| {
-            let receiver = receiver.free().ok_or_else(busy)?;
-            own(receiver.participant())?;
-            Ok(std::ptr::from_mut(receiver) as *mut dyn Source)
-        })
+        let receiver = table.find::<ReceiverObject>(id)?.free().ok_or_else(busy)?;
+        own(receiver.participant())?;
+        Ok(std::ptr::from_mut(receiver) as *mut dyn Source)
     }
 }
 
@@ -178,7 +190,10 @@ fn wait(node: &mut NodeObject, sources: &mut [&mut dyn Source], timeout_ns: i64)
         _ => _ = wait_any(sources, waiting, || false),
     }
     let is_over = waiting.deadline.is_some_and(|deadline| Instant::now() >= deadline);
-    if is_over { Err(Code::Nothing) } else { Ok(()) }
+    // What was there before, and what came at the last moment.
+    let is_ready = node.watches.as_ref().is_some_and(Watches::has_ready);
+    let is_there = is_ready || sources.iter().any(|source| source.may_have());
+    if is_over && !is_there { Err(Code::Nothing) } else { Ok(()) }
 }
 
 /// Tells a descriptor that was ready when `rohrpost_wait` returned; each is told once, then `ROHRPOST_NOTHING`. Thread:

@@ -5,12 +5,17 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
-enum { CHECK_ALL = 16, FAIL = 17, SMALL = 1, SECOND_NS = 1000 * 1000 * 1000 };
+enum { CHECK_ALL = 16, FAIL = 17, FORK = 18, TYPO = 19, BAD_REPLY = 20, SMALL = 1, SECOND_NS = 1000 * 1000 * 1000 };
 
 static const rohrpost_function FUNCTIONS[] = {
     ROHRPOST_ASKED(CHECK_ALL, "check", ROHRPOST_TEXT, "Its settings, if all is well."),
     ROHRPOST_ASKED(FAIL, "fail", ROHRPOST_UNIT, NULL),
+    ROHRPOST_ASKED(FORK, "fork", ROHRPOST_UNIT, NULL),
+    ROHRPOST_ASKED(TYPO, "typo", ROHRPOST_UNIT, NULL),
+    ROHRPOST_ASKED(BAD_REPLY, "bad_reply", ROHRPOST_UNIT, NULL),
 };
 static const rohrpost_field SMALL_FIELDS[] = {
     ROHRPOST_FIELD("number", ROHRPOST_U8, NULL, NULL),
@@ -28,7 +33,7 @@ static const rohrpost_parameter PARAMETERS[] = {
 static const char *const SETTINGS[] = {"name", "list"};
 
 // What came of each thing that it follows.
-static unsigned came[3];
+static unsigned came[4];
 
 #define GIVES(code, call)                                                                              \
     do {                                                                                               \
@@ -56,12 +61,22 @@ static rohrpost_outcome made(void *user) {
     DONE(rohrpost_module_follow("thermometer.0", "temperature", ROHRPOST_FOLLOW_PERIOD, SECOND_NS / 5, &follow));
     HOLDS(follow == 2);
     GIVES(ROHRPOST_CONFIGURATION, rohrpost_module_follow("nobody.0", "x", ROHRPOST_FOLLOW_EACH, 0, &follow));
+    // Left open: it is given up when the function ends.
+    uint8_t *room;
+    DONE(rohrpost_module_begin(SMALL, 0, "\x01\x00", 2, 1, &room));
     return ROHRPOST_OK;
+}
+
+static rohrpost_outcome on(void *user) {
+    (void)user;
+    uint8_t *room;
+    DONE(rohrpost_module_begin(SMALL, 0, "\x01\x00", 2, 1, &room));
+    return rohrpost_module_abandon();
 }
 
 static rohrpost_outcome received(void *user, const rohrpost_followed *data) {
     (void)user;
-    HOLDS(data->follow < 3 && data->number == 1 && data->stamp_ns > 0);
+    HOLDS(data->follow < 4 && data->number == 1 && data->stamp_ns > 0);
     rohrpost_decoder decoder = rohrpost_decode(data->value, data->len);
     rohrpost_get_f64(&decoder);
     came[data->follow] += 1;
@@ -82,7 +97,9 @@ static rohrpost_outcome calls(void) {
     GIVES(ROHRPOST_NULL_POINTER, rohrpost_module_call("thermometer.0", 16, bytes, len, long_ns, NULL));
     GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", 16, bytes, len - 1, long_ns, &reply));
     GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", 99, NULL, 0, long_ns, &reply));
+    reply = rohrpost_decode("\x07", 1);
     GIVES(ROHRPOST_CONFIGURATION, rohrpost_module_call("nobody.0", 16, NULL, 0, long_ns, &reply));
+    HOLDS(rohrpost_get_u8(&reply) == 0 && rohrpost_decoded(&reply) == ROHRPOST_MALFORMED);
     DONE(rohrpost_module_get("thermometer.0", 1, long_ns, &reply));
     HOLDS(rohrpost_get_u64(&reply) > 0);
     rohrpost_get_f64(&reply);
@@ -104,7 +121,10 @@ static rohrpost_outcome own(void) {
     GIVES(ROHRPOST_VALUE, rohrpost_module_set_parameter("share", "\x65", 1));
     GIVES(ROHRPOST_VALUE, rohrpost_module_set_parameter("share", "", 0));
     GIVES(ROHRPOST_NO_ITEM, rohrpost_module_set_parameter("speed", "\x46", 1));
+    value = rohrpost_decode("\x07", 1);
     GIVES(ROHRPOST_NO_ITEM, rohrpost_module_parameter("speed", &value));
+    // It is written all the same: nothing is in it.
+    HOLDS(rohrpost_get_u8(&value) == 0 && rohrpost_decoded(&value) == ROHRPOST_MALFORMED);
     GIVES(ROHRPOST_VALUE, rohrpost_module_watch(9999, ROHRPOST_READ, &watch));
     GIVES(ROHRPOST_VALUE, rohrpost_module_unwatch(7));
     return ROHRPOST_OK;
@@ -149,12 +169,45 @@ static rohrpost_outcome beside(void) {
     DONE(rohrpost_stream_reader_open(node, stream, &reader));
     DONE(rohrpost_stream_newest(reader, &record));
     HOLDS(record.len == 3 && memcmp(record.body, "\x07\x01z", 3) == 0);
+    // That was the only seat. What cannot be followed leaves nothing behind that hinders others.
+    uint32_t follow;
+    GIVES(ROHRPOST_RING, rohrpost_module_follow("asker.0", "small", ROHRPOST_FOLLOW_RECORDS, 0, &follow));
+    DONE(rohrpost_module_follow("thermometer.0", "temperature", ROHRPOST_FOLLOW_NEWEST, 0, &follow));
+    HOLDS(follow == 3);
     DONE(rohrpost_stream_reader_close(reader));
     return rohrpost_node_close(node);
 }
 
+// A child is no second module: its calls are refused, and it does not come back to the loop.
+static rohrpost_outcome forks(void) {
+    int status;
+    pid_t child = fork();
+    if (child == 0) {
+        _exit(rohrpost_module_publish(SMALL, 0, "\x09\x00", 2) == ROHRPOST_FORKED ? 0 : 1);
+    }
+    HOLDS(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    child = fork();
+    if (child == 0) {
+        return ROHRPOST_OK;
+    }
+    HOLDS(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 70);
+    return ROHRPOST_OK;
+}
+
 static rohrpost_outcome command(void *user, uint16_t number, rohrpost_decoder *arguments, rohrpost_encoder *reply) {
     (void)user;
+    if (number == FORK) {
+        return forks();
+    }
+    rohrpost_decoder value;
+    if (number == TYPO) {
+        return rohrpost_module_parameter("typo", &value);
+    }
+    if (number == BAD_REPLY) {
+        value = rohrpost_decode("", 0);
+        rohrpost_get_u8(&value);
+        return rohrpost_decoded(&value);
+    }
     if (number != CHECK_ALL) {
         // Without words: the last error is not another call's.
         return -1;
@@ -179,6 +232,7 @@ int main(int count, char **arguments) {
     module.settings = SETTINGS;
     module.setting_count = ROHRPOST_COUNT(SETTINGS);
     module.made = made;
+    module.on = on;
     module.received = received;
     module.command = command;
     return rohrpost_module_run(&module, count, (const char *const *)arguments);

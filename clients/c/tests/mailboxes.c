@@ -99,6 +99,9 @@ static void mistakes_are_codes_with_words(rohrpost_node node) {
     GIVES(ROHRPOST_CLOSED, rohrpost_receive(wrong, 0, &package));
     wrong.id = UINT64_MAX;
     GIVES(ROHRPOST_HANDLE, rohrpost_receive(wrong, 0, &package));
+    // Of another kind than the sender at its place: it does no harm to that.
+    const rohrpost_stream_writer forged = {(sender.id & ~((uint64_t)0xff << 16)) | (uint64_t)4 << 16};
+    GIVES(ROHRPOST_CLOSED, rohrpost_stream_writer_close(forged));
     DONE(rohrpost_sender_close(sender));
     GIVES(ROHRPOST_CLOSED, rohrpost_sender_close(sender));
     sender = sender_to(node, OWN);
@@ -186,6 +189,13 @@ static void streams_are_written_and_read_in_place(rohrpost_node node) {
     CHECK(record.about.sequence == 9);
     rohrpost_records_around around;
     at.ns = 1008;
+    // They do not take away what is in hand.
+    const rohrpost_source source = {reader.id};
+    GIVES(ROHRPOST_BUSY, rohrpost_source_idle(source));
+    GIVES(ROHRPOST_BUSY, rohrpost_stream_around(reader, at, &around));
+    GIVES(ROHRPOST_BUSY, rohrpost_stream_missed(reader, &missed));
+    DONE(rohrpost_stream_reader_release(reader));
+    DONE(rohrpost_source_idle(source));
     DONE(rohrpost_stream_around(reader, at, &around));
     CHECK(around.before.sequence == 8 && around.after.sequence == 8);
     DONE(rohrpost_stream_record(reader, 8, &record));
@@ -228,7 +238,10 @@ static void waits_for_mailboxes_streams_and_descriptors(rohrpost_node node) {
     rohrpost_source sources[3] = {{receiver.id}, {reader.id}, {0}};
     GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, sources, 2, 1000000));
     GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, NULL, 0, 1000000));
+    // Not at all: it tells what is there already.
+    GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, sources, 2, 0));
     DONE(rohrpost_send(sender, &COMMAND, "x", 1));
+    DONE(rohrpost_wait(node, sources, 2, 0));
     DONE(rohrpost_wait(node, sources, 2, -1));
     rohrpost_package package;
     DONE(rohrpost_receive(receiver, 0, &package));
@@ -236,6 +249,7 @@ static void waits_for_mailboxes_streams_and_descriptors(rohrpost_node node) {
     DONE(rohrpost_receiver_release(receiver));
     const rohrpost_stamp at = {1, 1};
     DONE(rohrpost_stream_write(writer, at, "r", 1, NULL));
+    DONE(rohrpost_wait(node, sources, 2, 0));
     DONE(rohrpost_wait(node, sources, 2, -1));
     rohrpost_record record;
     DONE(rohrpost_stream_next(reader, 0, &record, NULL));
@@ -254,7 +268,9 @@ static void waits_for_mailboxes_streams_and_descriptors(rohrpost_node node) {
     GIVES(ROHRPOST_VALUE, rohrpost_watch(node, 9999, ROHRPOST_READ, &none));
     GIVES(ROHRPOST_VALUE, rohrpost_watch(node, -1, ROHRPOST_READ, &none));
     GIVES(ROHRPOST_VALUE, rohrpost_watch(node, ends[0], 0, &none));
+    GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, sources, 2, 0));
     CHECK(write(ends[1], "!", 1) == 1);
+    DONE(rohrpost_wait(node, sources, 2, 0));
     DONE(rohrpost_wait(node, sources, 2, -1));
     DONE(rohrpost_next_ready(node, &ready));
     CHECK(ready.watch == watch && ready.readable && !ready.writable);
@@ -316,6 +332,19 @@ static void handles_belong_to_their_thread_and_process(rohrpost_node node, const
     CHECK(memcmp(package.body, "still here", 10) == 0);
 }
 
+// A failure that nobody can hear is one all the same: here nobody reads what the process says.
+static void a_module_fails_in_order_that_nobody_hears(void) {
+    pid_t child = fork();
+    CHECK(child >= 0);
+    if (child == 0) {
+        int ends[2];
+        CHECK(pipe(ends) == 0 && dup2(ends[1], 2) == 2 && close(ends[0]) == 0);
+        _exit(rohrpost_module_run(NULL, 0, NULL) == 1 ? 0 : 1);
+    }
+    int status;
+    CHECK(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
 int main(int count, char **arguments) {
     CHECK(count == 2);
     const char *directory = arguments[1];
@@ -327,6 +356,7 @@ int main(int count, char **arguments) {
     streams_are_written_and_read_in_place(node);
     waits_for_mailboxes_streams_and_descriptors(node);
     handles_belong_to_their_thread_and_process(node, directory);
+    a_module_fails_in_order_that_nobody_hears();
     // What is open is closed at the end.
     puts("all is well");
     return 0;

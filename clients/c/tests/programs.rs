@@ -58,7 +58,10 @@ fn linked(folder: &Path, (compiler, options): (&str, &[&str]), source: &str, lib
 
 /// Runs it with a directory for a node of its own; what it prints before it says that all is well.
 fn runs(mut command: Command, folder: &Path) -> String {
-    let output = command.arg(folder.join("node")).env_remove("ROHRPOST_CONFIG").output().unwrap();
+    command.arg(folder.join("node")).env_remove("ROHRPOST_CONFIG");
+    // Cargo's would lead to the library of an earlier `cargo build`.
+    command.env_remove("LD_LIBRARY_PATH");
+    let output = command.output().unwrap();
     let [printed, said] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let printed = printed.strip_suffix("all is well\n").filter(|_| output.status.success());
     printed.unwrap_or_else(|| panic!("{command:?}: {}\n{said}", output.status)).to_owned()

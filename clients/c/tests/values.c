@@ -92,6 +92,10 @@ static void nothing_is_read_behind_the_end(void) {
     d = rohrpost_decode(NULL, 3);
     CHECK(rohrpost_get_u64(&d) == 0);
     GIVES(ROHRPOST_MALFORMED, rohrpost_decoded(&d));
+    // Of zeros, as C makes what is not written yet.
+    memset(&d, 0, sizeof d);
+    CHECK(rohrpost_get_u8(&d) == 0);
+    GIVES(ROHRPOST_MALFORMED, rohrpost_decoded(&d));
     CHECK(rohrpost_get_u64(NULL) == 0);
     GIVES(ROHRPOST_NULL_POINTER, rohrpost_decoded(NULL));
 }
@@ -106,6 +110,9 @@ static void nothing_is_written_behind_the_end(void) {
     GIVES(ROHRPOST_SMALL_BUFFER, rohrpost_encoded(&e, &len));
     CHECK(len == 8 && buffer[10] == 0x5a);
     e = rohrpost_encode(NULL, 10);
+    rohrpost_put_u8(&e, 1);
+    GIVES(ROHRPOST_SMALL_BUFFER, rohrpost_encoded(&e, &len));
+    memset(&e, 0, sizeof e);
     rohrpost_put_u8(&e, 1);
     GIVES(ROHRPOST_SMALL_BUFFER, rohrpost_encoded(&e, &len));
     e = rohrpost_encode(buffer, 10);

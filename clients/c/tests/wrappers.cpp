@@ -4,6 +4,8 @@
 
 #include "check.h"
 
+#include <thread>
+
 namespace {
 
 constexpr uint32_t OWN = ROHRPOST_NAME(1, 200, 0, 0);
@@ -40,6 +42,8 @@ int main(int, char **arguments) {
         auto package = receiver.receive();
         CHECK(package && (*package)->len == 6 && memcmp((*package)->body, "copied", 6) == 0);
         throws(ROHRPOST_BUSY, [&] { node.wait({receiver.source()}); });
+        throws(ROHRPOST_BUSY, [&] { receiver.receive(0); });
+        CHECK(memcmp((*package)->body, "copied", 6) == 0);
     }
     // The package was released with its wrapper.
     CHECK(node.wait({receiver.source()}));
@@ -52,6 +56,8 @@ int main(int, char **arguments) {
     sender.send(LABEL, "left");
     rohrpost::Sender moved = std::move(sender);
     throws(ROHRPOST_HANDLE, [&] { sender.send(LABEL, "x"); });
+    // In another thread nothing happens, and it can still be removed here.
+    std::thread([&] { throws(ROHRPOST_THREAD, [&] { receiver.remove(); }); }).join();
     CHECK(receiver.remove() == 1);
 
     const rohrpost_stream stream = {OWN, 1};
@@ -60,11 +66,22 @@ int main(int, char **arguments) {
     CHECK(!reader.newest() && !reader.next(0));
     CHECK(writer.write({1, 1}, "first") == 0);
     CHECK(writer.write_in_place({1, 2}, [](uint8_t *body, size_t) { body[0] = '2'; return size_t{1}; }) == 1);
-    CHECK((*reader.next())->len == 5 && (*reader.next())->about.sequence == 1 && (*reader.newest())->body[0] == '2');
+    {
+        auto first = reader.next();
+        CHECK((*first)->len == 5);
+        // It is whole until its wrapper is gone: nothing takes it away.
+        throws(ROHRPOST_BUSY, [&] { reader.next(0); });
+        throws(ROHRPOST_BUSY, [&] { reader.newest(); });
+        throws(ROHRPOST_BUSY, [&] { reader.missed(); });
+        CHECK(memcmp((*first)->body, "first", 5) == 0);
+    }
+    CHECK((*reader.next())->about.sequence == 1);
+    CHECK((*reader.newest())->body[0] == '2');
     for (uint64_t ns = 3; ns < 103; ns++) {
         writer.write({1, ns}, "more");
     }
-    CHECK((*reader.next())->about.stamp.ns == 39 && reader.missed().passed_over == 36);
+    CHECK((*reader.next())->about.stamp.ns == 39);
+    CHECK(reader.missed().passed_over == 36);
     throws(ROHRPOST_LATE, [&] { writer.write({1, 1}, "late"); });
     puts("all is well");
     return 0;

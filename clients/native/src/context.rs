@@ -4,7 +4,7 @@ use crate::error::NativeError;
 use crate::following::{FollowRate, Following, item_of};
 use crate::parameters::Parameters;
 use crate::peers::{Peer, Peers};
-use crate::record::{OpenedRecord, RecordRoom};
+use crate::record::{Front, OpenedRecord, RecordRoom};
 use crate::streams::NativeStream;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Interest, Name, SystemTime, Watch};
@@ -28,6 +28,7 @@ pub(crate) struct NativeState {
     pub(crate) following: Following,
     pub(crate) peers: Peers,
     pub(crate) open: Option<OpenedRecord>,
+    pub(crate) front: Front,
 }
 
 /// A module's connection to its node, during a call of its functions.
@@ -45,6 +46,11 @@ impl NativeContext<'_> {
     /// The configuration that it runs under.
     pub fn installation(&self) -> &Installation {
         self.context.installation()
+    }
+
+    /// Whether its description has a function of this number.
+    pub fn offers(&self, number: u16) -> bool {
+        self.state.description.functions.iter().any(|function| function.number == number)
     }
 
     /// Its settings that are no parameters, as an object in JSON.
@@ -99,7 +105,8 @@ impl NativeContext<'_> {
     ) -> Result<RecordRoom, NativeError> {
         self.require(number, Some(DataKind::Stream))?;
         let at = at.unwrap_or_else(|| Moment::Ns(self.context.now().ns));
-        let (open, room) = OpenedRecord::begin(self.context, (self.state.serves, number), at, front, len)?;
+        let NativeState { serves, front: kept, .. } = &mut *self.state;
+        let (open, room) = OpenedRecord::begin(self.context, (*serves, number), at, (front, kept), len)?;
         self.state.open = Some(open);
         Ok(room)
     }
@@ -111,7 +118,7 @@ impl NativeContext<'_> {
     /// [`NativeError::NoRecordOpen`], or the stream does not take it.
     pub fn finish(&mut self, own: &[u8]) -> Result<u64, NativeError> {
         let open = self.state.open.take().ok_or(NativeError::NoRecordOpen)?;
-        open.finish(self.context, own)
+        open.finish(self.context, &self.state.front, own)
     }
 
     /// Gives up the record that is being filled; nothing happened.

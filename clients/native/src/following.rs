@@ -93,8 +93,13 @@ impl Following {
         }
         let request = DescriptionRequest::default();
         let (module, item) = (module.to_owned(), item.to_owned());
-        self.list.push(Follow { from, module, item, rate, request, found: None, is_hopeless: false });
-        self.look(context)?;
+        let mut follow = Follow { from, module, item, rate, request, found: None, is_hopeless: false };
+        follow.look(context)?;
+        self.list.push(follow);
+        if let Err(error) = self.keep_time(context) {
+            self.list.pop();
+            return Err(error);
+        }
         Ok(self.list.len() - 1)
     }
 
@@ -108,8 +113,16 @@ impl Following {
 
     fn look(&mut self, context: &mut Context) -> Result<(), NativeError> {
         for follow in &mut self.list {
-            follow.look(context)?;
+            // The others are none the worse for it.
+            if let Err(error) = follow.look(context) {
+                follow.give_up(&error);
+            }
         }
+        self.keep_time(context)
+    }
+
+    /// Has the timer run as long as it is needed.
+    fn keep_time(&mut self, context: &mut Context) -> Result<(), NativeError> {
         let is_waiting = self.list.iter().any(Follow::is_waiting);
         match &self.timer {
             None if is_waiting => self.timer = Some(started(context).map_err(|error| failed("a timer", error))?),
@@ -158,12 +171,14 @@ impl Follow {
         match item_of(&description, &self.module, &self.item, self.rate == FollowRate::Records) {
             Ok(item) => self.found = Some((self.subscribe(context, &item, description.hash())?, Rc::new(item))),
             // A module that is replaced by another is found by its subscribers when they begin anew.
-            Err(error) => {
-                tracing::error!("{error}");
-                self.is_hopeless = true;
-            }
+            Err(error) => self.give_up(&error),
         }
         Ok(())
+    }
+
+    fn give_up(&mut self, error: &NativeError) {
+        tracing::error!("{error}");
+        self.is_hopeless = true;
     }
 
     fn description(&mut self, context: &Context) -> Option<Description> {

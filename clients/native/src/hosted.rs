@@ -5,6 +5,7 @@ use crate::following::Following;
 use crate::module::{NativeInterface, NativeModule};
 use crate::parameters::Parameters;
 use crate::peers::Peers;
+use crate::record::Front;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Ready};
 use rohrpost_modules::interface::{StandIn, StandInCommand};
@@ -34,7 +35,11 @@ pub fn run(
         move |_: &Settings, installation: &Installation| Ok(vec![StandIn { name: serves(installation), description }]);
     run_described(start, described, move |settings, context| {
         let mut state = state(interface, settings, serves_too(context.installation()))?;
-        let module = make(&mut NativeContext { context, state: &mut state })?;
+        let mut context = NativeContext { context, state: &mut state };
+        let made = make(&mut context);
+        // As after each part of its code.
+        context.abandon();
+        let module = made?;
         Ok(Hosted { module, state })
     })
 }
@@ -65,7 +70,7 @@ fn state(interface: NativeInterface, settings: Settings, serves: Name) -> Result
     }
     let settings = serde_json::Value::Object(others).to_string();
     let (following, peers) = (Following::default(), Peers::default());
-    Ok(NativeState { serves, description, parameters, settings, following, peers, open: None })
+    Ok(NativeState { serves, description, parameters, settings, following, peers, open: None, front: Front::default() })
 }
 
 struct Hosted {

@@ -13,11 +13,15 @@ pub enum RecordRoom {
     Own(usize),
 }
 
+/// Postcard of a value without its last bytes. Kept for one record after the other, so that none takes from the heap.
+#[derive(Default)]
+pub(crate) struct Front(Vec<u8>);
+
 /// The record that is being filled.
 pub(crate) struct OpenedRecord {
     suspended: SuspendedValue,
-    /// Postcard of the value without its last bytes, if those come at the end.
-    front: Option<Vec<u8>>,
+    /// The value without its last bytes is in [`Front`], since those come at the end.
+    is_own: bool,
 }
 
 impl OpenedRecord {
@@ -27,7 +31,7 @@ impl OpenedRecord {
         context: &mut Context,
         (name, number): (Name, u16),
         at: Moment,
-        front: &[u8],
+        (front, kept): (&[u8], &mut Front),
         len: usize,
     ) -> Result<(Self, RecordRoom), ContextError> {
         let mut open = context.begin_as(name, number, at)?;
@@ -35,19 +39,23 @@ impl OpenedRecord {
         let base = place.as_ref().map(|place| place.address().addr().get());
         let room = open.fill_bytes(front, len)?;
         let from = base.map(|base| room.as_ptr().addr() - base);
-        let (front, room) = match (place, from) {
-            (Some(place), Some(from)) => (None, RecordRoom::Shared(place, from..from + len)),
-            _ => (Some(front.to_vec()), RecordRoom::Own(len)),
+        let (is_own, room) = match (place, from) {
+            (Some(place), Some(from)) => (false, RecordRoom::Shared(place, from..from + len)),
+            _ => {
+                kept.0.clear();
+                kept.0.extend_from_slice(front);
+                (true, RecordRoom::Own(len))
+            }
         };
-        Ok((Self { suspended: open.suspend(), front }, room))
+        Ok((Self { suspended: open.suspend(), is_own }, room))
     }
 
     /// Makes it the newest record; its sequence. `own`: its last bytes, if they are in the author's memory.
-    pub(crate) fn finish(self, context: &mut Context, own: &[u8]) -> Result<u64, NativeError> {
-        let Self { suspended, front } = self;
+    pub(crate) fn finish(self, context: &mut Context, front: &Front, own: &[u8]) -> Result<u64, NativeError> {
+        let Self { suspended, is_own } = self;
         let mut open = context.resume(suspended).ok_or(NativeError::NoRecordOpen)?;
-        if let Some(front) = front {
-            open.fill_bytes(&front, own.len())?.copy_from_slice(own);
+        if is_own {
+            open.fill_bytes(&front.0, own.len())?.copy_from_slice(own);
         }
         Ok(open.finish()?)
     }

@@ -120,13 +120,40 @@ mod tests {
             assert_eq!((place.len(), writer.written()), (BYTES, u64::from(number)), "nothing is there yet");
             // SAFETY: the record is being filled, so its bytes are this thread's alone.
             unsafe { place.address().as_ptr().write_bytes(number, 7) };
-            let given_up = writer.resume(suspended);
+            let given_up = writer.resume(suspended).unwrap();
             drop(given_up);
             let again = writer.begin(stamp(number)).unwrap().suspend();
-            let mut open = writer.resume(again);
+            let mut open = writer.resume(again).unwrap();
             open.body_mut()[..7].fill(number);
             let (sequence, seen) = open.finish_seen(7).unwrap();
             assert_eq!((sequence, seen), (u64::from(number), &[number; 7][..]));
+        }
+    }
+
+    #[test]
+    fn a_record_is_taken_up_by_its_writer_alone_and_only_if_no_other_was_begun_since() {
+        let folder = tempfile::tempdir().unwrap();
+        let participant = participant(&folder);
+        let (id, mut writer) = writer(&participant);
+        let shape = StreamShape { record_bytes: BYTES as u32, keep: 200, readers: 1, late: Duration::ZERO };
+        let mut other = participant.stream_writer(StreamId { number: 2, ..id }, shape).unwrap();
+        // Frames of the greater ring, which the smaller one does not have.
+        for number in 0..50 {
+            other.write(stamp(number), &[number; BYTES]).unwrap();
+        }
+        let strange = other.begin(stamp(50)).unwrap().suspend();
+        let own = writer.begin(stamp(0)).unwrap().suspend();
+        assert!(writer.resume(strange).is_none());
+        assert!(writer.resume(own).is_some());
+        let mut reader = participant.stream_reader(id).unwrap();
+        for number in 1..20 {
+            let given_up = writer.begin(stamp(number)).unwrap().suspend();
+            let sequence = writer.write(stamp(number), &[number; BYTES]).unwrap();
+            let held = reader.newest().unwrap().unwrap();
+            assert!(writer.resume(given_up).is_none(), "its frame is a record's by now, which a reader has in hand");
+            assert_eq!((held.info().sequence, held.body()), (sequence, &[number; BYTES][..]));
+            // Dropped, it costs no place.
+            let _ = writer.begin(stamp(number)).unwrap().suspend();
         }
     }
 }

@@ -45,6 +45,11 @@ pub struct StreamWriter {
     /// Tells this writer's records from those of earlier ones.
     pub(super) incarnation: u32,
     late_ns: u64,
+    /// The record that was suspended last, until it is taken up or another one is begun; the count that it had.
+    suspended: Option<(u64, Frame)>,
+    suspensions: u64,
+    /// Tells this writer from all others, as long as a record of it is suspended.
+    key: Arc<()>,
     /// Where a record is filled in place that may be copied while it is written.
     pub(super) draft: Vec<u8>,
     /// Holds the writer's lock. Below `segment`: fields drop in order, and the lock must outlast the map.
@@ -101,7 +106,19 @@ impl Participant {
         doorbell::ring_all(node);
         let draft = vec![0; if shape.is_racing() { shape.record_bytes as usize } else { 0 }];
         let (participant, incarnation, late_ns) = (self.clone(), node.next_incarnation(), shape.late_ns());
-        Ok(StreamWriter { participant, segment, progress, incarnation, late_ns, draft, _lock: lock })
+        let (suspended, suspensions, key) = (None, 0, Arc::new(()));
+        Ok(StreamWriter {
+            participant,
+            segment,
+            progress,
+            incarnation,
+            late_ns,
+            suspended,
+            suspensions,
+            key,
+            draft,
+            _lock: lock,
+        })
     }
 }
 
@@ -148,10 +165,15 @@ impl StreamWriter {
         Ok(OpenRecord { open: Some((self, frame)), stamp })
     }
 
-    /// Takes up a record of this stream that was suspended. Until then no other one can be begun.
-    pub fn resume(&mut self, suspended: SuspendedRecord) -> OpenRecord<'_> {
-        let SuspendedRecord { frame, stamp } = suspended;
-        OpenRecord { open: Some((self, frame)), stamp }
+    /// Takes up a record that was suspended; none if it is another writer's, or if another one was begun or written
+    /// since, by which it was given up.
+    pub fn resume(&mut self, suspended: SuspendedRecord) -> Option<OpenRecord<'_>> {
+        let is_its = |(count, _): &(u64, Frame)| *count == suspended.count && Arc::ptr_eq(&self.key, &suspended.key);
+        if !self.suspended.as_ref().is_some_and(is_its) {
+            return None;
+        }
+        let (_, frame) = self.suspended.take()?;
+        Some(OpenRecord { open: Some((self, frame)), stamp: suspended.stamp })
     }
 
     /// The record that was written last, by this writer or one before it; none before the first. Only the writer could
@@ -198,6 +220,9 @@ impl StreamWriter {
     }
 
     pub(super) fn claim(&mut self) -> Result<Frame, WriteError> {
+        if let Some((_, frame)) = self.suspended.take() {
+            self.progress.give_back(frame);
+        }
         self.progress.claim(&self.segment.ring()).ok_or(WriteError::Damaged(self.segment.id))
     }
 
@@ -229,10 +254,13 @@ fn wake(participant: &Participant, seat: &Seat, sleeper: u64) {
     }
 }
 
-/// A record that is being filled, and does not keep its writer meanwhile.
-#[must_use = "its place is lost to this writer unless it is taken up again"]
+/// A record that is being filled, and does not keep its writer meanwhile. Its place stays with the writer.
+#[must_use = "nothing is written unless it is taken up again"]
 pub struct SuspendedRecord {
-    frame: Frame,
+    /// Its writer's.
+    key: Arc<()>,
+    /// Which of those that its writer suspended.
+    count: u64,
     stamp: Stamp,
 }
 
@@ -259,11 +287,14 @@ impl<'a> OpenRecord<'a> {
         (!shape.is_racing()).then(place)
     }
 
-    /// Lets go of the writer, to be [taken up](StreamWriter::resume) later: what is in it stays.
+    /// Lets go of the writer, to be [taken up](StreamWriter::resume) later: what is in it stays, until another record
+    /// is begun or written.
     pub fn suspend(mut self) -> SuspendedRecord {
         // There from `begin` on until here.
-        let Some((_, frame)) = self.open.take() else { unreachable!("it is suspended once") };
-        SuspendedRecord { frame, stamp: self.stamp }
+        let Some((writer, frame)) = self.open.take() else { unreachable!("it is suspended once") };
+        writer.suspensions += 1;
+        writer.suspended = Some((writer.suspensions, frame));
+        SuspendedRecord { key: writer.key.clone(), count: writer.suspensions, stamp: self.stamp }
     }
 
     /// Makes the first `len` bytes the next record; its sequence.

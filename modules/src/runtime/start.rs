@@ -306,7 +306,8 @@ fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<A
             let say = move || output::print(&format_args!("does not stop within {within:?}; ended"));
             let _ = std::thread::Builder::new().spawn(say);
             std::thread::sleep(LAST_WORDS);
-            std::process::exit(1);
+            // At once: destructors and `atexit` of C would run beside the module, which still works.
+            signal_hook::low_level::exit(1);
         }
     };
     std::thread::Builder::new()

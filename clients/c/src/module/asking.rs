@@ -2,7 +2,7 @@
 
 use super::current::with_context;
 use crate::code::Code;
-use crate::decode::{Decoder, decoder};
+use crate::decode::{self, Decoder, decoder};
 use crate::edge::{bytes, bytes_to, edge, failed, needed_text, place, say};
 use crate::node::TimeNow;
 use crate::waiting::{interest_of, open_descriptor};
@@ -99,11 +99,12 @@ pub unsafe extern "C" fn rohrpost_module_parameter(
     value: Option<&mut MaybeUninit<Decoder>>,
 ) -> Code {
     edge(|| {
+        let out = place(value, "value")?.write(decode::none());
         // SAFETY: the caller's promise.
-        let (name, out) = (unsafe { needed_text(name, "name") }?, place(value, "value")?);
+        let name = unsafe { needed_text(name, "name") }?;
         with_context(|context| {
             let none = || say(Code::NoItem, format_args!("there is no parameter `{name}`"));
-            out.write(decoder(context.parameter(name).ok_or_else(none)?));
+            *out = decoder(context.parameter(name).ok_or_else(none)?);
             Ok(())
         })
     })
@@ -147,8 +148,8 @@ thread_local! {
 }
 
 /// Runs a function of another module, `motor.0`, by its number: arguments are values one behind the other, and so is
-/// the result, to be read from `reply`; it is there until the next such call. Waits for it at most `timeout_ns`, and
-/// all else of the module with it. The first call asks the other one what it offers.
+/// the result, to be read from `reply`; it is there until the next such call, and empty when this fails. Waits for it
+/// at most `timeout_ns`, and all else of the module with it. The first call asks the other one what it offers.
 ///
 /// # Safety
 /// The text is null or ends with a zero; `arguments` is null, or points to `len` bytes.
@@ -162,6 +163,7 @@ pub unsafe extern "C" fn rohrpost_module_call(
     reply: Option<&mut MaybeUninit<Decoder>>,
 ) -> Code {
     edge(|| {
+        let reply = place(reply, "reply")?.write(decode::none());
         // SAFETY: the caller's promise.
         let (module, arguments) = unsafe { (needed_text(module, "module")?, bytes(arguments, len, "arguments")?) };
         let timeout = Duration::from_nanos(timeout_ns);
@@ -182,6 +184,7 @@ pub unsafe extern "C" fn rohrpost_module_get(
     reply: Option<&mut MaybeUninit<Decoder>>,
 ) -> Code {
     edge(|| {
+        let reply = place(reply, "reply")?.write(decode::none());
         // SAFETY: the caller's promise.
         let module = unsafe { needed_text(module, "module") }?;
         let timeout = Duration::from_nanos(timeout_ns);
@@ -193,10 +196,9 @@ pub unsafe extern "C" fn rohrpost_module_get(
 fn asked(
     module: &str,
     timeout: Duration,
-    reply: Option<&mut MaybeUninit<Decoder>>,
+    reply: &mut Decoder,
     ask: impl FnOnce(&mut NativeContext<'_>, &Rc<Peer>) -> Result<Vec<u8>, CallError>,
 ) -> Result<(), Code> {
-    let out = place(reply, "reply")?;
     let result = with_context(|context| {
         let peer = context.peer(module, timeout).map_err(failed)?;
         let result = ask(context, &peer);
@@ -207,7 +209,7 @@ fn asked(
     })?;
     REPLY.with_borrow_mut(|kept| {
         *kept = result;
-        out.write(decoder(kept));
+        *reply = decoder(kept);
     });
     Ok(())
 }

@@ -15,7 +15,8 @@ thread_local! {
 }
 
 /// Begins a record of a stream with a type that ends with bytes: `front` are the values before them and a length of 0,
-/// and `room` becomes the place for `len` bytes, in shared memory. Fill them, then `rohrpost_module_finish` or
+/// and `room` becomes the place for `len` bytes: in shared memory, or, of a stream with records of 4096 bytes at most,
+/// beside it, from where they are copied. It is aligned to nothing. Fill them, then `rohrpost_module_finish` or
 /// `rohrpost_module_abandon`, in the same function. Only a function of the module may call this, and those two.
 ///
 /// # Safety

@@ -99,10 +99,12 @@ pub extern "C" fn rohrpost_stream_reader_close(reader: ReaderHandle) -> Code {
     edge(|| table::close::<ReaderObject>(reader.id).map(drop))
 }
 
-/// Takes the next record, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0: for ever;
-/// `ROHRPOST_NOTHING` when there is none. `ROHRPOST_LOST` when the writer has passed this reader: `lost`, which may be
-/// null, is how many records; then call it again. The record is in hand until the next one is taken, it is released, or
-/// the reader is closed; meanwhile the writer goes round it.
+/// Takes the next record, to be read in place. Waits for one at most `timeout_ns`, 0: not at all, below 0: for ever,
+/// which no signal ends (`rohrpost_wait` returns then); `ROHRPOST_NOTHING` when there is none. `ROHRPOST_LOST` when the
+/// writer has passed this reader: `lost`, which may be null, is how many records; then call it again.
+///
+/// The record is in hand until the next call that takes one from this reader, whatever that returns, or until it is
+/// released or the reader is closed; meanwhile the writer goes round it. Its bytes are aligned to nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_next(
     reader: ReaderHandle,
@@ -173,8 +175,14 @@ fn hand_out(
     })
 }
 
-/// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. What is in hand is released.
-/// `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
+/// A reader with nothing in hand.
+fn idle(reader: &mut ReaderObject) -> Result<&mut StreamReader, Code> {
+    let busy = || say(Code::Busy, format_args!("this reader has a record in hand: release it first"));
+    reader.free().ok_or_else(busy)
+}
+
+/// The two records around a time, for interpolation; `rohrpost_stream_record` reads each. `ROHRPOST_BUSY` while a
+/// record is in hand: release it first. `ROHRPOST_NOTHING` when there are none (yet): the last error says exactly why.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_around(
     reader: ReaderHandle,
@@ -183,8 +191,8 @@ pub extern "C" fn rohrpost_stream_around(
 ) -> Code {
     edge(|| {
         let out = place(records, "records")?;
-        let found =
-            table::with(reader.id, |reader: &mut ReaderObject| reader.back().around(stamp(at)).map_err(failed))?;
+        let around = |reader: &mut ReaderObject| idle(reader)?.around(stamp(at)).map_err(failed);
+        let found = table::with(reader.id, around)?;
         let nothing = |why: std::fmt::Arguments<'_>| Err(say(Code::Nothing, why));
         match found {
             Around::Records { before, after } => {
@@ -212,7 +220,8 @@ pub extern "C" fn rohrpost_stream_reader_release(reader: ReaderHandle) -> Code {
     })
 }
 
-/// How many records this reader did not get since it was opened, by cause. What is in hand is released.
+/// How many records this reader did not get since it was opened, by cause. `ROHRPOST_BUSY` while a record is in hand:
+/// release it first.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_missed(
     reader: ReaderHandle,
@@ -220,7 +229,7 @@ pub extern "C" fn rohrpost_stream_missed(
 ) -> Code {
     edge(|| {
         let out = place(missed, "missed")?;
-        let missed = table::with(reader.id, |reader: &mut ReaderObject| Ok(reader.back().missed()))?;
+        let missed = table::with(reader.id, |reader: &mut ReaderObject| Ok(idle(reader)?.missed()))?;
         out.write(RecordsMissed { lost: missed.lost, sampled: missed.sampled, passed_over: missed.passed_over });
         Ok(())
     })

@@ -71,7 +71,7 @@ pub unsafe extern "C" fn rohrpost_stream_write(
 
 /// Begins a record that is written in place: `body` is its place, of `room` bytes, where anything may stand. Readers
 /// see it when it is finished by `rohrpost_stream_finish`; until then, or until `rohrpost_stream_abandon`, the writer
-/// is busy.
+/// is busy. The place is aligned to nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_begin(
     writer: WriterHandle,

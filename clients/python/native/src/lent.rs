@@ -4,6 +4,7 @@ use crate::fails::misuse;
 use pyo3::prelude::*;
 use rohrpost_native::NativeContext;
 use std::cell::Cell;
+use std::io::Write;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -43,7 +44,9 @@ pub(crate) fn lend<T>(context: &mut NativeContext<'_>, part: impl FnOnce() -> T)
     LENT.set(Some(NonNull::from(context).cast()));
     let result = part();
     if is_forked() {
-        eprintln!("a forked process came back to the loop of its parent's module, and ends; let it end by os._exit");
+        let why = "a forked process came back to the loop of its parent's module, and ends; let it end by os._exit";
+        // Where nobody can hear it, it ends all the same.
+        let _ = writeln!(std::io::stderr(), "{why}");
         std::process::exit(70);
     }
     result

@@ -97,8 +97,8 @@ impl Context {
         self.begin_at(stream, epoch, stamp_ns)
     }
 
-    /// Takes up a record that was suspended ([`OpenValue::suspend`]). Until then no other one of its stream can be
-    /// begun.
+    /// Takes up a record that was suspended ([`OpenValue::suspend`]); none if it is no stream's of this module, or if
+    /// another one of its stream was begun or published since, by which it was given up.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::{Context, ContextError, OpenValue, SuspendedValue};
@@ -109,7 +109,7 @@ impl Context {
     pub fn resume(&mut self, suspended: SuspendedValue) -> Option<OpenValue<'_, ()>> {
         let (_, streams, outlet) = self.split();
         let OwnStream { about, writer } = streams.iter_mut().find(|stream| suspended.is_of(stream))?;
-        Some(OpenValue::resumed(suspended, writer, about, outlet))
+        OpenValue::resumed(suspended, writer, about, outlet)
     }
 
     /// The next record of a stream.

@@ -53,7 +53,7 @@ pub struct OpenValue<'a, T> {
 }
 
 /// A value that is being written in place, and does not keep its context meanwhile.
-#[must_use = "its place is lost to the stream unless it is taken up again"]
+#[must_use = "nothing is published unless it is taken up again"]
 pub struct SuspendedValue {
     record: SuspendedRecord,
     len: Option<usize>,
@@ -140,7 +140,8 @@ impl<'a, T: Data> OpenValue<'a, T> {
         self.record.at()
     }
 
-    /// Lets go of the context, until [`super::super::Context::resume`]; what was put in stays.
+    /// Lets go of the context, until [`super::super::Context::resume`]; what was put in stays, until another record of
+    /// the stream is begun or published.
     pub fn suspend(self) -> SuspendedValue {
         let (endpoint, number) = (self.about.endpoint, self.about.item.number);
         let (record, len) = (self.record.suspend(), self.len);
@@ -152,9 +153,10 @@ impl<'a, T: Data> OpenValue<'a, T> {
         writer: &'a mut StreamWriter,
         about: &'a OwnAbout,
         outlet: Distribution<'a>,
-    ) -> Self {
+    ) -> Option<Self> {
         let SuspendedValue { record, len, stamp_ns, sequence, .. } = suspended;
-        Self { record: writer.resume(record), len, stamp_ns, sequence, about, outlet, data: PhantomData }
+        let record = writer.resume(record)?;
+        Some(Self { record, len, stamp_ns, sequence, about, outlet, data: PhantomData })
     }
 
     /// Makes it the stream's newest record; its sequence, which counts the stream's records. It is counted as
