@@ -222,6 +222,7 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
     assert_eq!(answers(&scene, "strayed").trim(), "70", "a child that comes back is ended");
     let calls = answers(&scene, "calls");
     for words in [
+        "stale: no exception, but None",
         "has no function `fly`; it has: drive, halt",
         "BadArguments: the arguments cannot be written: speed_m_s: expected a number (f64), got `fast`",
         "FunctionError: NotFinite",
