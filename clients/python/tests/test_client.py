@@ -76,6 +76,22 @@ class Clients(unittest.TestCase):
             self.client.command("probe.0", 16, self.client.describe("probe.0").hash, b"", 20)
         self.assertEqual(fault.exception.fault.number, ARGUMENTS)
 
+    def test_nothing_that_comes_ends_a_client(self) -> None:
+        # A mistake of this package, say, that one package brings out.
+        received, kept = self.host._core.received, threading.Event()
+
+        def fails(now_ns: int, data: bytes) -> None:
+            if not kept.is_set():
+                kept.set()
+                raise ZeroDivisionError("unforeseen")
+            received(now_ns, data)
+
+        with self.assertLogs("rohrpost", "ERROR"):
+            self.host._core.received = fails  # type: ignore[method-assign]
+            wait(kept.is_set)
+            wait(lambda: self.host._core.session.is_up)
+        self.assertEqual(self.call("count", 2), 2)
+
     def test_what_is_lost_or_doubled_on_the_way_runs_once(self) -> None:
         turn = iter(range(10**9))
         # Each package is lost, comes once or comes twice.

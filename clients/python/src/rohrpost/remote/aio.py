@@ -30,7 +30,7 @@ from .aio_handles import AsyncProxy, AsyncRecordStream, AsyncSubscription, Modul
 from .calls import Call
 from .client import Client
 from .clock import passed_ns
-from .core import Endpoint, not_connected
+from .core import Endpoint, broken, not_connected
 from .session import Settings, Step
 from .shell import Shell, documented_like
 from .streams import Wanted
@@ -337,7 +337,11 @@ class _Line(asyncio.Protocol):
             return self._client._broken(self, str(error))
         self._flush()
         if self._client._line is self:
-            self._client._core.received(passed_ns(), plain)
+            try:
+                self._client._core.received(passed_ns(), plain)
+            except Exception as error:  # Nothing that comes may end what is hosted here.
+                self.drop()
+                return self._client._broken(self, broken(error))
             self._client._soon()
 
     def connection_lost(self, error: Exception | None) -> None:

@@ -26,7 +26,7 @@ from .. import wire
 from . import calling
 from .calls import Call
 from .clock import passed_ns
-from .core import Endpoint, not_connected
+from .core import Endpoint, broken, not_connected
 from .handles import ModuleHost, Proxy, RecordStream, Subscription
 from .session import Settings, Step
 from .shell import Shell
@@ -317,8 +317,8 @@ class Client(Shell):
                     self._wake_in.recv(4096)
                 elif line is not None:
                     self._read(line)
-        except (OSError, NoConnection) as error:
-            why = str(error) if isinstance(error, NoConnection) else f"the connection broke: {error}"
+        except Exception as error:  # Nothing that comes may end this thread, and with it all that is hosted here.
+            why = broken(error)
             with self._lock:
                 self._core.session.closed(passed_ns(), why)
             self._drop(selector, line)

@@ -91,9 +91,10 @@ class Describing:
             if len(self._bytes) < part.total:
                 return self._ask()
             description = Description.from_bytes(self._bytes)
+            _ = description.hash  # Whatever is wrong with it shows here.
         except CallError as error:
             return self._done(error)
-        except (WalkError, SchemaError) as error:
+        except (WalkError, SchemaError, RecursionError) as error:
             return self._done(BadReply(self._to, str(error)))
         self._done(description)
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from .errors import WalkError, counted
+from .errors import WalkError, counted, plain
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
@@ -37,6 +37,15 @@ def decode_front(type: Type, data: bytes) -> tuple[Any, int]:
     decoder = Decoder(data)
     value = decoder.value(type)
     return value, len(data) - decoder.at
+
+
+def made(python: Any, *values: Any, **named: Any) -> Any:
+    """A value of an author's class, which may refuse what came: then the bytes are wrong, not this program."""
+    try:
+        return python(*values, **named)
+    except Exception as error:
+        words = plain(f"{type(error).__name__}: {error}")[:200]
+        raise WalkError(f"its class does not take it: {words}") from error
 
 
 class Decoder:
@@ -128,7 +137,7 @@ class Decoder:
 
     def struct(self, type: Struct) -> Any:
         members = self.members(type.named)
-        return members if type.python is None else type.python(**(members or {}))
+        return members if type.python is None else made(type.python, **(members or {}))
 
     def map(self, type: Map) -> Any:
         length = self.length(False)
@@ -149,7 +158,7 @@ class Decoder:
             payload = self.members(variant)
         except WalkError as error:
             raise error.within(variant.name) from None
-        return Variant(variant.name, payload) if type.python is None else type.python(variant.name, payload)
+        return Variant(variant.name, payload) if type.python is None else made(type.python, variant.name, payload)
 
     def length(self, is_of_empty: bool) -> int:
         claimed, left = self.varint(64), len(self.data) - self.at
