@@ -190,6 +190,23 @@ class Bridged(unittest.TestCase):
         self.assertEqual(self.told(), ["begin", "abandon", "begin", "abandon", "begin", "finish"])
         self.assertEqual(self.asked(18), "painted")
 
+    def test_parameters_are_those_of_the_runtime_or_keep_their_values(self) -> None:
+        def field(type: Any, value: Any) -> bytes:
+            return encode(type_of(type), value)
+
+        def values(gain: int, speed: float) -> list[tuple[str, bytes]]:
+            return [("gain", field(rp.U8, gain)), ("speed-m-s", field(rp.F32, speed))]
+
+        self.assertIsNone(self.bridge.parameters_set(values(3, 0.2)), "its most is in its range")
+        self.assertEqual(self.painter.gain, 3)
+        for gain, speed, why in [(7, 0.1, "not seven"), (4, 0.3, "not in its range"), (4, float("nan"), "not in its")]:
+            self.assertIn(why, self.bridge.parameters_set(values(gain, speed)))
+            self.assertEqual((self.painter.gain, round(self.painter.speed_m_s, 6)), (3, 0.2))
+        self.runtime.refuses = "not now"
+        with self.assertRaisesRegex(rp.Misuse, "not now"):
+            self.painter.gain = 5
+        self.assertEqual(self.painter.gain, 3)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -130,6 +130,17 @@ class Interfaces(unittest.TestCase):
             with self.assertRaisesRegex(rp.Misuse, why):
                 define()
 
+    def test_numbers_that_are_not_finite_are_in_no_range(self) -> None:
+        class Any(rp.Module, klass="any"):
+            speed: float = rp.parameter(0.0)
+            short: rp.F32 = rp.parameter(0.1, min=0.1, max=0.1)
+
+        its = Any()
+        for value in (float("nan"), float("inf")):
+            with self.assertRaisesRegex(rp.Misuse, "Any.speed: .* is not in its range, f64"):
+                its.speed = value
+        its.short = 0.1
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -186,13 +186,16 @@ class Bridge(NodeHost):
         """Parameters have new values; why the module does not want them."""
         module = self._its()
         old = {it.name: getattr(module, it.name) for it in self._interface.parameters}
-        self._configure(values)
+        told = None
         try:
+            self._configure(values)
             module.parameters_set()
         except BaseException as error:  # It is the author's word, whatever its class.
+            told = str(error) or words_of(error)
+        told = self._settled(told)
+        if told is not None:
             module.__dict__.update(old)
-            return str(error) or words_of(error)
-        return None
+        return told
 
     # For the module.
 
