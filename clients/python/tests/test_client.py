@@ -335,6 +335,56 @@ class Clients(unittest.TestCase):
 
         asyncio.run(main())
 
+    def test_what_leaves_or_cancels_itself_is_a_module_in_error(self) -> None:
+        class Odd:
+            def __repr__(self) -> str:
+                raise KeyError("odd")
+
+        class Leaves(rp.Module, klass="probe"):
+            @rp.command(16)
+            def leave(self) -> None:
+                sys.exit(3)
+
+            @rp.command(17)
+            def odd(self) -> rp.Pose:
+                return Odd()  # type: ignore[return-value]
+
+        class AsyncLeaves(Leaves, klass="probe"):
+            @rp.command(18)
+            async def cancel(self) -> None:
+                task = asyncio.get_running_loop().create_task(asyncio.sleep(20))
+                task.cancel()
+                await task
+
+            @rp.command(19)
+            async def go(self) -> None:
+                sys.exit(4)
+
+            @rp.command(20)
+            async def hang(self) -> None:
+                await asyncio.sleep(60)
+
+        async def hosted_in_a_loop() -> None:
+            async with await aio.connect(self.server.address, "tool.8", INSTALLATION, timeout_s=20) as client:
+                client.host("probe.2", AsyncLeaves())
+                for function, why in {**told, "cancel": "CancelledError", "go": "SystemExit: 4"}.items():
+                    with self.assertRaisesRegex(rp.CallFault, f"the module is in error: {why}"):
+                        await client.call("probe.2", function, timeout_s=20)
+                    for on in (False, True):
+                        await client.switch("probe.2", on, 20)
+                with self.assertRaises(rp.CallTimeout):
+                    await client.call("probe.2", "hang", timeout_s=0.1)
+            # Its own end is no failure, and waits for nobody.
+
+        told = {"leave": "SystemExit: 3", "odd": "RuntimeError: what it returns cannot be told: KeyError"}
+        self.host.host("probe.1", Leaves())
+        for function, why in told.items():
+            with self.assertRaisesRegex(rp.CallFault, f"the module is in error: {why}"):
+                self.client.call("probe.1", function, timeout_s=5)
+            for on in (False, True):
+                self.client.switch("probe.1", on, 20)
+        asyncio.run(hosted_in_a_loop())
+
     def test_both_clients_have_the_same_methods_and_each_has_a_text(self) -> None:
         def public(cls: type) -> dict[str, Any]:
             return {name: getattr(cls, name) for name in dir(cls) if not name.startswith("_")}
