@@ -55,7 +55,7 @@ fn modules(place: &Place) -> Vec<String> {
 /// Reads all that there is; each picture is of one number, as the camera makes them.
 fn read_rest(reader: &mut StreamReader) {
     loop {
-        match reader.next().unwrap() {
+        match reader.try_next().unwrap() {
             Next::Nothing => return,
             Next::Lost(_) => {}
             Next::Record(record) => {
