@@ -130,6 +130,21 @@ class Interfaces(unittest.TestCase):
             with self.assertRaisesRegex(rp.Misuse, why):
                 define()
 
+    def test_no_function_hides_one_that_each_module_has(self) -> None:
+        def made(key: str, value: Any) -> None:
+            type("Hides", (rp.Module,), {key: value, "__annotations__": {key: int}}, klass="any")
+
+        def one(self: Any) -> int:
+            raise AssertionError("it is never run")
+
+        for key, value in [
+            ("write", rp.command(16)(one)), ("settings", rp.data_out(1)(one)), ("switched_on", rp.every(1.0)(one)),
+            ("proxy", rp.parameter(1)), ("_host", rp.stream(2)(one)),
+        ]:  # fmt: skip
+            with self.assertRaisesRegex(rp.Misuse, f"Hides.{key}: each module has a `{key}` of its own"):
+                made(key, value)
+        made("written", rp.command(16, name="write")(one))
+
     def test_numbers_that_are_not_finite_are_in_no_range(self) -> None:
         class Any(rp.Module, klass="any"):
             speed: float = rp.parameter(0.0)

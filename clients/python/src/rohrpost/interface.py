@@ -249,6 +249,13 @@ def _marks(cls: type) -> list[tuple[str, Any, Any]]:
 
 def _interface(cls: type, klass: str, name: str) -> Interface:
     all_marked = _marks(cls)
+    hides = [key for key, *_ in all_marked] + [key for key, it in vars(cls).items() if isinstance(it, Parameter)]
+    for key in hides:
+        if key in vars(Module):
+            raise Misuse(
+                f"{cls.__name__}.{key}: each module has a `{key}` of its own, which this would hide; take another name "
+                f"(`name=\"{key}\"` in the brackets of a command, data or a stream keeps this one for others)"
+            )
     declared = {key: function for key, _, function in all_marked}
     marked = [(key, mark) for key, mark, _ in all_marked]
     commands = [(key, mark) for key, mark in marked if isinstance(mark, Command)]
