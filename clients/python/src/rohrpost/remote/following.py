@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..common import DescriptionPart, Subscribe, Unsubscribe, type_of_class
-from ..errors import BadReply, CallError, CallFault, RohrpostError
+from ..errors import BadReply, CallError, CallFault, CallTimeout, RohrpostError
 from ..faults import INTERFACE_DIFFERS
 from ..names import DATA, Name
 from ..schema.binary import type_to_bytes
@@ -58,7 +58,8 @@ def item_of(to: Name, described: Description, name: str, expected: Type | None, 
 
 
 class Describing:
-    """Asks a module what it offers, part by part; ``done`` gets it, or what went wrong. ``now`` tells the time, ns."""
+    """Asks a module what it offers, part by part, all of them in this time; ``done`` gets it, or what went wrong.
+    ``now`` tells the time, ns."""
 
     def __init__(
         self,
@@ -69,16 +70,17 @@ class Describing:
         done: Callable[[Description | CallError], None],
     ) -> None:
         self._caller, self._now, self._to, self._done = caller, now, to, done
-        self._timeout_ns = timeout_ns
+        self._timeout_ns, self._until_ns = timeout_ns, now() + timeout_ns
         self._bytes = b""
         self._ask()
 
     def _ask(self) -> None:
-        arguments = encode(U32, len(self._bytes))
+        arguments, now_ns = encode(U32, len(self._bytes)), self._now()
+        left_ns = self._until_ns - now_ns
+        if self._bytes and left_ns <= 0:
+            return self._done(CallTimeout(self._to, self._timeout_ns / 1e9))
         try:
-            self._caller.begin(
-                self._now(), self._to, DESCRIBE, COMMON_HASH, arguments, self._timeout_ns, self._answered
-            )
+            self._caller.begin(now_ns, self._to, DESCRIBE, COMMON_HASH, arguments, left_ns, self._answered)
         except CallError as error:
             self._done(error)
 
@@ -92,6 +94,9 @@ class Describing:
                 return self._ask()
             description = Description.from_bytes(self._bytes)
             _ = description.hash  # Whatever is wrong with it shows here.
+        except CallTimeout:
+            # However much of that the last part had.
+            return self._done(CallTimeout(self._to, self._timeout_ns / 1e9))
         except CallError as error:
             return self._done(error)
         except (WalkError, SchemaError, RecursionError) as error:
@@ -168,7 +173,8 @@ class Following:
     def _subscribed(self, call: Call) -> None:
         if call.error is not None:
             if isinstance(call.error, CallFault) and call.error.fault.number == INTERFACE_DIFFERS:
-                self._description, self._next_ns = None, 0
+                # Asked anew when its time comes: one that always says so is not asked without a pause.
+                self._description = None
             return self._failed(call.error)
         self._is_asking = False
         self._state(None)
