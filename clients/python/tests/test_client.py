@@ -269,6 +269,15 @@ class Clients(unittest.TestCase):
         free.close()
         with self.assertRaisesRegex(rp.NoConnection, f"the TCP router at {address} is not reached"):
             remote.connect(address, "tool.1", INSTALLATION, timeout_s=1)
+        nowhere = "x" * 64 + ".invalid:1"
+        with self.assertRaisesRegex(rp.NoConnection, "is not reached: .*label"):
+            remote.connect(nowhere, "tool.1", INSTALLATION, timeout_s=1)
+        with self.assertRaisesRegex(rp.NoConnection, "is not reached: .*label"):
+            asyncio.run(aio.connect(nowhere, "tool.1", INSTALLATION, timeout_s=1))
+        with remote.connect(address, "tool.1", INSTALLATION, timeout_s=0) as ends:
+            threading.Timer(0.1, ends.close).start()
+            with self.assertRaisesRegex(rp.Misuse, "this client is closed"):
+                ends.wait_until_up(20)
         other = remote.Installation(7, {"tool": 16}, 8, 1)
         with self.assertRaisesRegex(rp.NoConnection, "the common digest here is 0000000000000008"):
             remote.connect(self.server.address, "tool.1", other, timeout_s=1)

@@ -77,7 +77,9 @@ class Client(Shell):
     def wait_until_up(self, timeout_s: float) -> None:
         """Waits until it takes part. Raises :class:`NoConnection` with what is in the way."""
         with self._locked():
-            if not self._lock.wait_for(lambda: self._core.session.is_up or self._is_closed, timeout_s):
+            self._lock.wait_for(lambda: self._core.session.is_up or self._is_closed, timeout_s)
+            if not self._core.session.is_up:
+                self._check()
                 raise not_connected(self._core)
 
     @contextlib.contextmanager
@@ -290,14 +292,14 @@ class Client(Shell):
         why = ""
         try:
             stream = socket.create_connection(self._server, timeout=_CONNECT_S)
-        except OSError as error:
+            stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except (OSError, UnicodeError) as error:  # Also a name that is none: of a part of 64 letters, say.
             host, port = self._server
             why = f"the TCP router at {host}:{port} is not reached: {error}"
         with self._lock:
             if why:
                 self._core.session.closed(passed_ns(), why)
                 return None
-            stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             stream.setblocking(False)
             selector.register(stream, selectors.EVENT_READ)
             self._core.session.connected(passed_ns())
