@@ -168,8 +168,16 @@ class Bridged(unittest.TestCase):
         self.assertEqual(self.told(), ["begin", "finish"])
 
     def test_no_record_is_written_where_a_view_of_another_one_is_kept(self) -> None:
-        self.assertIn("is kept, so `picture` takes no record until it is let go", self.asked(16, "keep"))
-        self.assertEqual(self.told(), ["begin", "abandon"])
+        with self.assertRaisesRegex(rp.Misuse, "is kept, so `picture` takes no record until it is let go"):
+            self.painter.paint("keep")
+        self.assertIsNone(self.bridge._settled(None), "it was told")
+        self.painter.kept = None
+        with self.assertRaisesRegex(RuntimeError, "no paint"):
+            self.painter.paint("fail")
+        with self.assertRaises(rp.Misuse):
+            self.painter.paint("keep")
+        self.assertIsNone(self.bridge._settled(None), "it was told")
+        self.assertEqual(self.told(), ["begin", "abandon"] * 3)
         for number, texts in ((16, [""]), (21, [])):
             self.assertIn("is kept, so `picture`", self.asked(number, *texts))
         self.assertEqual(self.told(), [])

@@ -80,7 +80,7 @@ class Bridge(NodeHost):
         self._opened: _Opened | None = None
         self._kept: dict[str, View] = {}
         """Of records that were given up, by their streams: into their places somebody may still write."""
-        self._given_up: list[str] = []
+        self._given_up: set[str] = set()
         """Streams of those that the function which runs has given up."""
 
     def parameters(self) -> list[tuple[bytes, bytes]]:
@@ -230,6 +230,7 @@ class Bridge(NodeHost):
             raise Misuse(f"a record of `{stream}` was given up at the end of the function that began it")
         if view is not None and not view.release():
             self._give_up(opened)
+            self._given_up.discard(stream)  # It is told here.
             raise _kept(stream)
         self._opened = None
         _node.finish(bytes(own))
@@ -274,7 +275,7 @@ class Bridge(NodeHost):
         self._opened = None
         if opened.view is not None:
             self._kept[opened.stream] = opened.view
-            self._given_up.append(opened.stream)
+            self._given_up.add(opened.stream)
 
     def _is_free(self, stream: str) -> bool:
         """Whether nobody can write any more into records of this stream that were given up."""
