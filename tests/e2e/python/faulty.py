@@ -27,6 +27,17 @@ def said(part) -> str:
         return f"{type(error).__name__}: {error}"
 
 
+def locks(process="self") -> int:
+    """How many locks of files a process holds that tell that it lives."""
+    found = 0
+    for number in os.listdir(f"/proc/{process}/fdinfo"):
+        try:
+            found += "OFDLCK" in open(f"/proc/{process}/fdinfo/{number}").read()
+        except OSError:
+            continue
+    return found
+
+
 class Gripper(rp.Module, klass="gripper", settings=("mood",)):
     """Does what tests ask of it."""
 
@@ -79,12 +90,17 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
     def forked(self) -> str:
         """In a child."""
         reads, writes = os.pipe()
+        camera = self.stream("camera.0", "image", rp.Image, timeout_s=20)
+        again = said(lambda: rp.run(Gripper))
         child = os.fork()
         if child == 0:
-            os.write(writes, said(self.now_ns).encode())
+            uses = [said(it) for it in (self.now_ns, camera.missed, lambda: rp.run(Gripper))]
+            logging.info("a line of a child")
+            os.write(writes, "; ".join([*uses, f"locks: {locks()}, its parent's: {locks(os.getppid()) > 0}"]).encode())
             os._exit(0)
         os.waitpid(child, 0)
-        return os.read(reads, 500).decode()
+        with camera.next(timeout_s=20) as record:
+            return f"again: {again}; {os.read(reads, 2000).decode()}; goes on: {record.sequence > 0}"
 
     @rp.command(22)
     def strayed(self) -> int:
