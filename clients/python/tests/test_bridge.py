@@ -14,6 +14,8 @@ from unittest import mock
 import rohrpost as rp
 from rohrpost.annotations import type_of
 from rohrpost.schema import encode
+from rohrpost.schema.binary import field_to_bytes
+from rohrpost.schema.tree import Field
 
 
 class Memory:
@@ -61,6 +63,7 @@ class Painter(rp.Module, klass="painter"):
 
     def __init__(self) -> None:
         self.kept: Any = None
+        self.noted: list[str] = []
         self.later = contextlib.ExitStack()
 
     def parameters_set(self) -> None:
@@ -123,6 +126,10 @@ class Painter(rp.Module, klass="painter"):
     def dot(self) -> None:
         """Writes."""
         self.write("picture", b".")
+
+    @rp.on_record("camera.0", "note", most_bytes=8)
+    def note(self, words: str) -> None:
+        self.noted.append(words)
 
     @rp.stream(1)
     def picture(self) -> bytes:
@@ -197,6 +204,13 @@ class Bridged(unittest.TestCase):
         self.assertEqual(self.asked(17), "no paint, painted")
         self.assertEqual(self.told(), ["begin", "abandon", "begin", "abandon", "begin", "finish"])
         self.assertEqual(self.asked(18), "painted")
+
+    def test_records_of_more_bytes_than_wanted_are_not_taken(self) -> None:
+        self.bridge._followed[0] = Painter.interface_.records[0]
+        field = field_to_bytes(Field("note", type_of(str)))
+        for words in ("seven b", "eight by"):
+            self.assertIsNone(self.bridge.received(0, field, encode(type_of(str), words), 1, 1, 0))
+        self.assertEqual(self.painter.noted, ["seven b"])
 
     def test_parameters_are_those_of_the_runtime_or_keep_their_values(self) -> None:
         def field(type: Any, value: Any) -> bytes:

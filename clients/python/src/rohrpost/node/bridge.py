@@ -137,6 +137,8 @@ class Bridge(NodeHost):
         """Data or a record that one of its functions follows."""
         handler = self._followed[follow]
         its = handler.mark
+        if isinstance(its, OnRecord) and (len(data) if isinstance(data, bytes) else data.length) > its.most_bytes:
+            return
         what = f"`{its.stream}`" if isinstance(its, OnRecord) else f"`{its.data}`"
         type = self._type(field, handler, f"{what} of {its.publisher}")
         try:
