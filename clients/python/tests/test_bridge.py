@@ -178,7 +178,7 @@ class Bridged(unittest.TestCase):
         with self.assertRaisesRegex(rp.Misuse, "is kept, so `picture` takes no record until it is let go"):
             self.painter.paint("keep")
         self.assertIsNone(self.bridge._settled(None), "it was told")
-        self.painter.kept = None
+        vars(self.painter).update(kept=None)
         with self.assertRaisesRegex(RuntimeError, "no paint"):
             self.painter.paint("fail")
         with self.assertRaises(rp.Misuse):
