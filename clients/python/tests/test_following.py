@@ -10,8 +10,10 @@ from rohrpost.common import DescriptionPart, type_of_class
 from rohrpost.faults import INTERFACE_DIFFERS, Fault
 from rohrpost.names import Name
 from rohrpost.remote.calls import Caller
-from rohrpost.remote.following import Describing, Following
-from rohrpost.schema import encode
+from rohrpost.remote.following import Describing, Following, NoSuchData, item_of
+from rohrpost.schema import encode, tree
+from rohrpost.schema.description import DataItem, Description
+from rohrpost.schema.tree import Field
 from rohrpost.wire import DESCRIBE, ERROR, CallEnvelope, Package, ReplyEnvelope, package
 
 from .modules import Probe
@@ -65,6 +67,12 @@ class Followed(unittest.TestCase):
                 self.answer(Fault(INTERFACE_DIFFERS, (1,)).to_bytes(), ERROR)
             self.now_ns += SECOND // 20
         self.assertEqual((len(self.asked), len(problems)), (2, 1))
+
+    def test_names_of_others_stay_in_their_line(self) -> None:
+        described = Description("Any", "any", (), (DataItem(1, Field("\x1b[2J\n", tree.U8)),))
+        with self.assertRaises(NoSuchData) as missing:
+            item_of(PROBE, described, "beat", None, "data")
+        self.assertTrue(str(missing.exception).endswith("it has: \\u{1b}[2J\\n"), missing.exception)
 
 
 if __name__ == "__main__":

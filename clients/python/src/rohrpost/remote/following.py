@@ -14,7 +14,7 @@ from ..schema.binary import type_to_bytes
 from ..schema.decode import decode
 from ..schema.description import DataItem, Description
 from ..schema.encode import encode
-from ..schema.errors import SchemaError, WalkError
+from ..schema.errors import SchemaError, WalkError, plain
 from ..schema.text import describe_type
 from ..schema.tree import U32, Type
 from ..wire import (
@@ -47,7 +47,7 @@ def item_of(to: Name, described: Description, name: str, expected: Type | None, 
     having = [it for it in described.data if what == "data" or it.is_stream]
     item = next((it for it in having if it.name == name), None)
     if item is None:
-        names = ", ".join(it.name for it in having) or "none"
+        names = ", ".join(plain(it.name) for it in having) or "none"
         raise NoSuchData(f"{to}: no {what} `{name}`; it has: {names}")
     if expected and type_to_bytes(expected, True) != type_to_bytes(item.field.type, True):
         raise NoSuchData(

@@ -23,7 +23,7 @@ from ..schema import tree
 from ..schema.decode import decode
 from ..schema.description import Description
 from ..schema.encode import encode
-from ..schema.errors import WalkError
+from ..schema.errors import WalkError, plain
 from ..schema.tree import Tuple, Type
 from .calls import Call, Caller
 from .following import Describing, NoSuchData, item_of
@@ -174,7 +174,7 @@ class Streams:
             wanted.assembly.record_bytes = min(found[0].record_bytes, wanted.most_bytes)
             return
         name = f"{self._installation.text(wanted.publisher)}/{wanted.stream}"
-        given = ", ".join(f"{self._installation.text(Name(it.source))}/{it.item}" for it in having) or "none"
+        given = ", ".join(f"{self._installation.text(Name(it.source))}/{plain(it.item)}" for it in having) or "none"
         wanted.say(
             NoSuchStream(
                 f"the robot sends node {self._node} no stream {name}; its file needs a [[replica]] with "
