@@ -12,7 +12,7 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
+import importlib
 import os
 import signal
 import sys
@@ -28,8 +28,22 @@ _runs = False
 
 
 def is_available() -> bool:
-    """Whether this package was built with its part in Rust, so that modules run on the node."""
-    return importlib.util.find_spec("rohrpost._node") is not None
+    """Whether this package has its part in Rust, and that loads, so that modules run on the node."""
+    return _missing() is None
+
+
+def _missing() -> str | None:
+    """Why there are no modules on the node."""
+    try:
+        importlib.import_module("rohrpost._node")
+    except ModuleNotFoundError:
+        return (
+            "this package was installed without its part in Rust, so it has no modules on the node: on Linux, with "
+            "Rust installed, `pip install ./clients/python` builds it; `rohrpost.remote` takes part from anywhere"
+        )
+    except ImportError as error:
+        return f"the part of this package that is Rust does not load, so it has no modules on the node: {error}"
+    return None
 
 
 def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
@@ -38,11 +52,9 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
     Launch tells it by its environment what it is; by hand say ``--config FILE --name CLASS.INSTANCE``, or give it as
     ``arguments``. Raises :class:`rohrpost.Misuse` where it cannot run at all.
     """
-    if not is_available():
-        raise Misuse(
-            "this package was installed without its part in Rust, so it has no modules on the node: on Linux, with "
-            "Rust installed, `pip install ./clients/python` builds it; `rohrpost.remote` takes part from anywhere"
-        )
+    missing = _missing()
+    if missing is not None:
+        raise Misuse(missing)
     if threading.current_thread() is not threading.main_thread():
         raise Misuse("`rohrpost.run` is for the main thread: it takes the signals that end a module")
     global _runs
