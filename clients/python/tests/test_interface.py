@@ -130,6 +130,19 @@ class Interfaces(unittest.TestCase):
             with self.assertRaisesRegex(rp.Misuse, why):
                 define()
 
+    def test_fields_with_names_that_python_has_its_own_meaning_of_travel_too(self) -> None:
+        @rp.data
+        class Odd:
+            made: Annotated[rp.U8, rp.said(name="__init__")]
+            kind: Annotated[rp.U8, rp.said(name="__class__")]
+            start: Annotated[rp.U8, rp.said(name="from")]
+
+        value = schema.decode(type_of(Odd), b"\1\2\3")
+        self.assertEqual((value, type(value), getattr(value, "from")), (Odd(1, 2, 3), Odd, 3))
+        self.assertEqual(schema.encode(type_of(Odd), value), b"\1\2\3")
+        self.assertEqual(schema.to_json(type_of(Odd), value), {"__init__": 1, "__class__": 2, "from": 3})
+        self.assertEqual(schema.show(type_of(Odd), value), "{__init__: 1, __class__: 2, from: 3}")
+
     def test_no_function_hides_one_that_each_module_has(self) -> None:
         def made(key: str, value: Any) -> None:
             type("Hides", (rp.Module,), {key: value, "__annotations__": {key: int}}, klass="any")
