@@ -76,6 +76,7 @@ impl Drop for Stream {
 /// Opens a stream of another module, which is asked what it offers; the field of its values.
 #[pyfunction]
 pub(crate) fn open_stream(py: Python<'_>, module: &str, item: &str, timeout_s: f64) -> PyResult<(Stream, Py<PyBytes>)> {
+    drop_left();
     with(py, |context| {
         let timeout = Duration::try_from_secs_f64(timeout_s.max(0.0)).unwrap_or(Duration::MAX);
         let opened = apart(py, context, |context| context.stream(module, item, timeout));
