@@ -54,6 +54,22 @@ class Followed(unittest.TestCase):
         self.assertEqual([type(it) for it in found], [rp.CallTimeout])
         self.assertIn("within 1s;", str(found[0]))
 
+    def test_a_subscription_waits_longer_for_many_parts_than_for_one(self) -> None:
+        problems: list[Any] = []
+        following = Following(
+            self.caller, lambda: self.now_ns, 1, PROBE, "beat", None, 0, False, lambda _: None, problems.append
+        )
+        whole = Probe.interface_.description.to_bytes()
+        following.poll(self.now_ns)
+        for at in range(9):
+            self.answer(self.part(whole, at, 1))
+            self.now_ns += SECOND - 1
+            self.caller.poll(self.now_ns)
+        self.assertEqual(problems, [])
+        self.now_ns += 1
+        self.caller.poll(self.now_ns)
+        self.assertEqual([type(it) for it in problems], [rp.CallTimeout])
+
     def test_one_whose_interface_always_differs_is_asked_with_pauses(self) -> None:
         problems: list[Any] = []
         following = Following(

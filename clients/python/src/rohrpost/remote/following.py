@@ -25,6 +25,8 @@ from .calls import Call, Caller
 LEASE_MS = 3000
 _RENEW_NS = 1_000_000_000
 _PATIENCE_NS = 1_000_000_000
+DESCRIBED_NS = 10 * _PATIENCE_NS
+"""A description comes in this time, however slow the way is and many parts it has."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,8 @@ def item_of(to: Name, described: Description, name: str, expected: Type | None, 
 
 
 class Describing:
-    """Asks a module what it offers, part by part, all of them in this time; ``done`` gets it, or what went wrong.
-    ``now`` tells the time, ns."""
+    """Asks a module what it offers, part by part, all of them in this time, each in ``each_ns``; ``done`` gets it, or
+    what went wrong. ``now`` tells the time, ns."""
 
     def __init__(
         self,
@@ -68,15 +70,17 @@ class Describing:
         to: Name,
         timeout_ns: int,
         done: Callable[[Description | CallError], None],
+        each_ns: int | None = None,
     ) -> None:
         self._caller, self._now, self._to, self._done = caller, now, to, done
         self._timeout_ns, self._until_ns = timeout_ns, now() + timeout_ns
+        self._each_ns = timeout_ns if each_ns is None else each_ns
         self._bytes = b""
         self._ask()
 
     def _ask(self) -> None:
         arguments, now_ns = encode(U32, len(self._bytes)), self._now()
-        left_ns = self._until_ns - now_ns
+        left_ns = min(self._until_ns - now_ns, self._each_ns)
         if self._bytes and left_ns <= 0:
             return self._done(CallTimeout(self._to, self._timeout_ns / 1e9))
         try:
@@ -144,7 +148,7 @@ class Following:
         if now_ns >= self._next_ns and not self._is_asking:
             self._is_asking, self._next_ns = True, now_ns + _RENEW_NS
             if self._description is None:
-                Describing(self._caller, self._now, self.to, _PATIENCE_NS, self._described)
+                Describing(self._caller, self._now, self.to, DESCRIBED_NS, self._described, _PATIENCE_NS)
             else:
                 self._subscribe(self._description)
         return self._next_ns

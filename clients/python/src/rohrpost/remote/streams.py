@@ -26,7 +26,7 @@ from ..schema.encode import encode
 from ..schema.errors import WalkError, plain
 from ..schema.tree import Tuple, Type
 from .calls import Call, Caller
-from .following import Describing, NoSuchData, item_of
+from .following import DESCRIBED_NS, Describing, NoSuchData, item_of
 from .frames import DescribedPart, RecordPart, Registered
 from .records import Assembly, Record
 
@@ -244,7 +244,7 @@ class _Asking:
         done: Callable[[BeyondStreams | RohrpostError], None],
     ) -> None:
         self._caller, self._now, self._router, self._done = caller, now, router, done
-        Describing(caller, now, router, _PATIENCE_NS, self._described)
+        Describing(caller, now, router, DESCRIBED_NS, self._described, _PATIENCE_NS)
 
     def _described(self, described: Description | CallError) -> None:
         if isinstance(described, CallError):
