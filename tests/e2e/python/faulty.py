@@ -156,7 +156,7 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         x_m = odometry.interpolated((before_ns + after_ns) // 2).pose.x_m
         told.append(f"half way: {abs(x_m - (before_m + after_m) / 2) < 1e-6}")
         threading.Thread(target=lambda: told.append(said(lambda: camera.missed()))).run()
-        for _ in range(80):
+        for _ in range(12):
             # Of more than have a seat each is collected in another thread.
             left = [self.stream("camera.0", "image", rp.Image, timeout_s=20)]
             thread = threading.Thread(target=left.clear)

@@ -98,9 +98,10 @@ class Describing:
                 return self._ask()
             description = Description.from_bytes(self._bytes)
             _ = description.hash  # Whatever is wrong with it shows here.
-        except CallTimeout:
-            # However much of that the last part had.
-            return self._done(CallTimeout(self._to, self._timeout_ns / 1e9))
+        except CallTimeout as error:
+            # However much of all the time the last part had.
+            is_over = self._now() >= self._until_ns
+            return self._done(CallTimeout(self._to, self._timeout_ns / 1e9) if is_over else error)
         except CallError as error:
             return self._done(error)
         except (WalkError, SchemaError, RecursionError) as error:
