@@ -159,8 +159,8 @@ def data(cls: type[T] | None = None, *, name: str | None = None) -> Any:
     def decorate(cls: type[T]) -> type[T]:
         known = name or cls.__name__
         if issubclass(cls, enum.Enum):
-            variants = tuple(Named(member) for member in cls.__members__)
-            made: Type = tree.Enum(known, variants, _text(cls), lambda chosen, _: cls[chosen])
+            variants = tuple(map(Named, cls.__members__))
+            made: Type = tree.Enum(known, variants, _text(cls), tree.Members(cls.__members__))
         else:
             made_class: Any = cls if "__dataclass_fields__" in cls.__dict__ else dataclass(cls)
             hints = _hints(made_class)

@@ -84,6 +84,12 @@ class Name:
     def __repr__(self) -> str:
         return str(self)
 
+    def __eq__(self, other: object) -> bool:
+        return self.raw == other.raw if isinstance(other, Name) else NotImplemented
+
+    def __hash__(self) -> int:
+        return self.raw
+
     def __lt__(self, other: Name) -> bool:
         return self.raw < other.raw
 

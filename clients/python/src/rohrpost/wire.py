@@ -30,6 +30,10 @@ UNKNOWN_NS = (1 << 63) - 1
 """An error of a time that is not known."""
 
 
+_HEAD = struct.Struct("<IIHhHBB"), struct.Struct(">IIHhHBB")
+"""Of a head, by its bit :data:`BIG_ENDIAN`."""
+
+
 class WireError(ValueError):
     """Bytes are no package of ours."""
 
@@ -49,18 +53,16 @@ class Head:
 
     def to_bytes(self) -> bytes:
         """16 bytes, in the byte order that its options tell."""
-        order = ">" if self.options & BIG_ENDIAN else "<"
-        front = struct.pack(order + "IIHhH", self.to, self.sender, self.length, self.kind, self.id)
-        return front + bytes([self.priority, self.options])
+        form = _HEAD[self.options & BIG_ENDIAN]
+        return form.pack(self.to, self.sender, self.length, self.kind, self.id, self.priority, self.options)
 
     @staticmethod
     def from_bytes(data: bytes) -> Head:
         """Reads the first 16 bytes."""
         if len(data) < HEAD_BYTES:
             raise WireError(f"a head has {HEAD_BYTES} bytes, not {len(data)}")
-        order = ">" if data[15] & BIG_ENDIAN else "<"
-        to, sender, length, kind, id = struct.unpack(order + "IIHhH", data[:14])
-        return Head(to, sender, kind, id, data[14], data[15], length)
+        to, sender, length, kind, id, priority, options = _HEAD[data[15] & BIG_ENDIAN].unpack_from(data)
+        return Head(to, sender, kind, id, priority, options, length)
 
     @property
     def is_command(self) -> bool:
@@ -82,7 +84,7 @@ class Head:
             limit = receiver
         else:
             limit = max(sender, receiver)
-        return replace(self, priority=min(self.priority, limit))
+        return self if self.priority <= limit else replace(self, priority=limit)
 
 
 def data_kind(number: int) -> int:

@@ -70,6 +70,9 @@ class Bridge(NodeHost):
         self._items = {item.name: item for item in self._interface.description.data}
         self._numbered = {item.number: item for item in self._items.values()}
         self._functions = {function.number: function for function in self._interface.description.functions}
+        self._arguments = {
+            number: Tuple(tuple(field.type for field in its.arguments)) for number, its in self._functions.items()
+        }
         self._module: Module | None = None
         self._settings: dict[str, Any] = {}
         self._followed: dict[int, Handler] = {}
@@ -136,21 +139,20 @@ class Bridge(NodeHost):
     ) -> None:
         """Data or a record that one of its functions follows."""
         handler = self._followed[follow]
-        its = handler.mark
-        if isinstance(its, OnRecord) and (len(data) if isinstance(data, bytes) else data.length) > its.most_bytes:
+        its, length = handler.mark, len(data) if isinstance(data, bytes) else data.length
+        if isinstance(its, OnRecord) and length > its.most_bytes:
             return
-        what = f"`{its.stream}`" if isinstance(its, OnRecord) else f"`{its.data}`"
-        type = self._type(field, handler, f"{what} of {its.publisher}")
+        type = self._types.get((handler.name, field)) or self._type(field, handler)
         try:
             held = Held(type, data)
         except WalkError as error:
-            raise Misuse(f"{what} of {its.publisher} cannot be read: {error}") from None
+            raise Misuse(f"{_followed(handler)} cannot be read: {error}") from None
         try:
             getattr(self._its(), handler.name)(held.value)
         finally:
             is_free = held.release()
         if not is_free:
-            raise kept(f"record {sequence} of {what} of {its.publisher}")
+            raise kept(f"record {sequence} of {_followed(handler)}")
 
     @_told
     def ready(self, watch: int, readable: bool, writable: bool) -> None:
@@ -167,8 +169,7 @@ class Bridge(NodeHost):
     def _answered(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
         function, handler = self._functions[number], self._interface.commands[number]
         try:
-            fields = Tuple(tuple(field.type for field in function.arguments))
-            values = decode(fields, arguments)
+            values = decode(self._arguments[number], arguments)
         except WalkError as error:
             return None, True, str(error)
         has_error = handler.mark.error is not None
@@ -326,12 +327,10 @@ class Bridge(NodeHost):
         except WalkError as error:
             raise Misuse(f"{self._class.__name__}.{item.name}: {error.within('value')}") from None
 
-    def _type(self, field: bytes, handler: Handler, what: str) -> Type:
-        """The type of what came, with the author's classes, if the function names one."""
-        found = self._types.get((handler.name, field))
-        if found is None:
-            found = self._checked(field, handler.type, what, f"`{handler.name}` takes")
-            self._types[handler.name, field] = found
+    def _type(self, field: bytes, handler: Handler) -> Type:
+        """The type of what came for the first time, with the author's classes, if the function names one."""
+        found = self._checked(field, handler.type, _followed(handler), f"`{handler.name}` takes")
+        self._types[handler.name, field] = found
         return found
 
     @staticmethod
@@ -350,3 +349,9 @@ def _kept(stream: str) -> Misuse:
         f"a view of a record of `{stream}` that is being filled is kept, so `{stream}` takes no record until it is let "
         "go; copy what you keep: `bytes(…)`, `numpy.array(…)`"
     )
+
+
+def _followed(handler: Handler) -> str:
+    """What a function follows, in words."""
+    its = handler.mark
+    return f"`{its.stream if isinstance(its, OnRecord) else its.data}` of {its.publisher}"

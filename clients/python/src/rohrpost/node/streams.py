@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,8 @@ from .views import Held, View, kept
 
 if TYPE_CHECKING:
     from .._node import Shared, Stream
+
+    _Found = tuple[int, int, int, bytes | Shared]
 
 
 @dataclass(frozen=True)
@@ -62,32 +64,18 @@ class StreamReader:
         self.type = type
         """Of its values."""
 
-    @contextmanager
-    def newest(self) -> Iterator[Record]:
+    def newest(self) -> InHand:
         """The newest record; the position stays. Raises :class:`NoRecord` before the first."""
-        found = self._own().newest()
-        if found is None:
-            raise NoRecord(f"{self._what} has no record yet")
-        with self._hold(*found) as record:
-            yield record
+        return InHand(self, self._newest)
 
-    @contextmanager
-    def next(self, timeout_s: float = 0.0) -> Iterator[Record]:
+    def next(self, timeout_s: float = 0.0) -> InHand:
         """The next record; the first time the first one written after it was opened. Waits so long, and all else of
         the module with it. Raises :class:`NoRecord` if none came, and :class:`Lost` once if some were overwritten."""
-        found, lost = self._own().next(timeout_s)
-        if lost:
-            raise Lost(lost, self._what)
-        if found is None:
-            raise NoRecord(f"no record of {self._what} came within {timeout_s} s")
-        with self._hold(*found) as record:
-            yield record
+        return InHand(self, functools.partial(self._next, timeout_s))
 
-    @contextmanager
-    def record(self, sequence: int) -> Iterator[Record]:
+    def record(self, sequence: int) -> InHand:
         """The record of this number. Raises :class:`NoRecord` if it is there no more, or not yet."""
-        with self._hold(*self._record(sequence)) as record:
-            yield record
+        return InHand(self, functools.partial(self._record, sequence))
 
     def around(self, time_ns: int) -> tuple[tuple[int, int], tuple[int, int]]:
         """Number and time of the two records around a time; both the same, if one has this very time. Raises
@@ -97,12 +85,9 @@ class StreamReader:
             raise NoRecord(f"{self._what} has no two records around {time_ns} ns: {_WHY[why]}")
         return around
 
-    @contextmanager
-    def at(self, time_ns: int) -> Iterator[Record]:
+    def at(self, time_ns: int) -> InHand:
         """The record nearest to a time. Raises :class:`NoRecord` as :meth:`around` does."""
-        (before, before_ns), (after, after_ns) = self.around(time_ns)
-        with self.record(before if time_ns - before_ns <= after_ns - time_ns else after) as record:
-            yield record
+        return InHand(self, functools.partial(self._at, time_ns))
 
     def interpolated(self, time_ns: int) -> Any:
         """The value at a time, between those of the two records around it. Numbers with a fraction go in a straight
@@ -111,12 +96,6 @@ class StreamReader:
         (before, before_ns), (after, after_ns) = self.around(time_ns)
         start, end = (self._copied(it) for it in (before, after))
         return between(self.type, self._unit, start, end, (time_ns - before_ns) / max(after_ns - before_ns, 1))
-
-    def _record(self, sequence: int) -> tuple[int, int, int, bytes | Shared]:
-        found = self._own().record(sequence)
-        if found is None:
-            raise NoRecord(f"record {sequence} of {self._what} is there no more, or not yet")
-        return found
 
     def _copied(self, sequence: int) -> Any:
         """The value of a record, which stays when the record goes."""
@@ -142,19 +121,56 @@ class StreamReader:
             raise Misuse(f"a record of {self._what} is in hand; leave its `with` before another is read")
         return self._stream
 
-    @contextmanager
-    def _hold(self, sequence: int, stamp_ns: int, epoch: int, data: bytes | Shared) -> Iterator[Record]:
+    def _newest(self) -> _Found:
+        found = self._own().newest()
+        if found is None:
+            raise NoRecord(f"{self._what} has no record yet")
+        return found
+
+    def _next(self, timeout_s: float) -> _Found:
+        found, lost = self._own().next(timeout_s)
+        if lost:
+            raise Lost(lost, self._what)
+        if found is None:
+            raise NoRecord(f"no record of {self._what} came within {timeout_s} s")
+        return found
+
+    def _record(self, sequence: int) -> _Found:
+        found = self._own().record(sequence)
+        if found is None:
+            raise NoRecord(f"record {sequence} of {self._what} is there no more, or not yet")
+        return found
+
+    def _at(self, time_ns: int) -> _Found:
+        (before, before_ns), (after, after_ns) = self.around(time_ns)
+        return self._record(before if time_ns - before_ns <= after_ns - time_ns else after)
+
+
+class InHand:
+    """A record, from the beginning of a ``with`` to its end."""
+
+    __slots__ = ("_find", "_reader", "_sequence")
+
+    def __init__(self, reader: StreamReader, find: Callable[[], _Found]) -> None:
+        self._reader, self._find, self._sequence = reader, find, 0
+
+    def __enter__(self) -> Record:
+        reader = self._reader
+        self._sequence, stamp_ns, epoch, data = self._find()
         try:
-            held = self._held = Held(self.type, data)
+            held = reader._held = Held(reader.type, data)
         except WalkError as error:
-            raise BadReply(Name(0), f"{self._what}: {error}") from None
-        try:
-            yield Record(held.value, stamp_ns, epoch, sequence)
-        finally:
-            self._held = None
-            is_free = held.release()
-        if not is_free:
-            raise kept(f"record {sequence} of {self._what}")
+            raise BadReply(Name(0), f"{reader._what}: {error}") from None
+        record = Record.__new__(Record)
+        # Its own `__init__` takes each of them past what makes it frozen, one by one.
+        record.__dict__.update(value=held.value, time_ns=stamp_ns, epoch=epoch, sequence=self._sequence)
+        return record
+
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        reader = self._reader
+        held, reader._held = reader._held, None
+        if held is not None and not held.release() and error is None:
+            raise kept(f"record {self._sequence} of {reader._what}")
 
 
 _WHY = {

@@ -12,13 +12,13 @@ stream takes no other until the view is let go.
 from __future__ import annotations
 
 import ctypes
+import functools
 import gc
 import weakref
 from typing import TYPE_CHECKING, Any
 
 from ..errors import Misuse
-from ..schema.decode import Decoder
-from ..schema.errors import WalkError, counted
+from ..schema.decode import decode
 from ..schema.tree import Type
 
 if TYPE_CHECKING:
@@ -28,20 +28,28 @@ VIEWED_MIN = 1024
 """Shorter bytes in a value are copied: that is quicker than a view."""
 
 
+@functools.lru_cache(maxsize=16)
+def _array_of(length: int) -> Any:
+    """Its class, of which the making takes a while: most records of a stream are of one length."""
+    return ctypes.c_ubyte * length
+
+
 class View:
     """Bytes of a record while they are lent."""
 
     def __init__(self, shared: Shared, is_writable: bool = False) -> None:
-        array: Any = (ctypes.c_ubyte * shared.length).from_address(shared.address)
+        array: Any = _array_of(shared.length).from_address(shared.address)
         array.keeps = shared
         self._array = weakref.ref(array)
         whole = memoryview(array).cast("B")
         self.whole = whole if is_writable else whole.toreadonly()
         self._lent = [whole, self.whole]
 
-    def part(self, start: int, end: int) -> memoryview:
-        """Some of them."""
+    def lend(self, start: int, end: int) -> memoryview | bytes:
+        """Some of them, if they are many; else a copy."""
         part = self.whole[start:end]
+        if end - start < VIEWED_MIN:
+            return bytes(part)
         self._lent.append(part)
         return part
 
@@ -70,15 +78,11 @@ class Held:
     def __init__(self, type: Type, data: bytes | Shared) -> None:
         self._view: View | None = None
         if isinstance(data, bytes):
-            decoder = Decoder(data)
-        else:
-            self._view = View(data)
-            decoder = _ViewDecoder(self._view)
+            self.value = decode(type, data)
+            return
+        view = self._view = View(data)
         try:
-            self.value = decoder.value(type)
-            left = len(decoder.data) - decoder.at
-            if left:
-                raise WalkError(f"{counted(left, 'byte')} too many")
+            self.value = decode(type, view.whole, view.lend)
         except BaseException:
             self.release()
             raise
@@ -88,17 +92,6 @@ class Held:
         self.__dict__.pop("value", None)
         view, self._view = self._view, None
         return view is None or view.release()
-
-
-class _ViewDecoder(Decoder):
-    def __init__(self, view: View) -> None:
-        super().__init__(view.whole)
-        self._view = view
-
-    def octets(self) -> Any:
-        length = self.varint(64)
-        start = self.skip(length)
-        return self._view.part(start, self.at) if length >= VIEWED_MIN else bytes(self.data[start : self.at])
 
 
 def kept(what: str) -> Misuse:

@@ -18,7 +18,7 @@ from ..schema.description import Description, Function
 from ..schema.encode import encode
 from ..schema.errors import WalkError, plain
 from ..schema.text import is_result
-from ..schema.tree import Tuple, Type
+from ..schema.tree import Field, Tuple, Type
 from ..errors import CallFault
 from .calls import Call
 
@@ -49,18 +49,22 @@ def function_of(to: Name, description: Description, name: str) -> Function:
 def prepare(description: Description, function: Function, values: tuple[Any, ...], named: dict[str, Any]) -> Prepared:
     """Raises :class:`BadArguments`, with the argument that does not fit, and what was expected."""
     fields = function.arguments
+    if not named and len(values) == len(fields):
+        data = b"".join(map(_argument, fields, values))
+        return Prepared(function.number, description.hash, data, function.result)
     names = [field.name for field in fields]
     unknown = [name for name in named if name not in names[len(values) :]]
     if unknown or len(values) + len(named) != len(fields):
         raise BadArguments(f"`{plain(function.name)}` takes {', '.join(map(plain, names)) or 'nothing'}")
     given = dict(zip(names, values)) | named
-    data = b""
-    for field, value in zip(fields, [given[name] for name in names]):
-        try:
-            data += encode(field.type, value)
-        except WalkError as error:
-            raise BadArguments(str(error.within(field.name))) from None
-    return Prepared(function.number, description.hash, data, function.result)
+    return prepare(description, function, tuple(given[name] for name in names), {})
+
+
+def _argument(field: Field, value: Any) -> bytes:
+    try:
+        return encode(field.type, value)
+    except WalkError as error:
+        raise BadArguments(str(error.within(field.name))) from None
 
 
 def prepare_get(to: Name, description: Description, data: str) -> Prepared:

@@ -1,18 +1,16 @@
 """The synchronous client: a shell around the core with a socket, a thread and a lock.
 
-One thread reads and writes; each hosted module has a thread of its own, which runs its functions one after the other.
-All methods may be called from any thread.
+One thread reads and writes, or while calls wait one of those (:mod:`.line`); each hosted module has a thread of its own,
+which runs its functions one after the other. All methods may be called from any thread.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import selectors
 import socket
 import ssl
 import threading
-from collections.abc import Iterator
 from typing import Any
 
 from ..common import Status
@@ -28,14 +26,17 @@ from .calls import Call
 from .clock import passed_ns
 from .core import Endpoint, broken, not_connected
 from .handles import ModuleHost, Proxy, RecordStream, Subscription
+from .line import Ears, Line, Waiting
 from .session import Settings, Step
 from .shell import Shell
 from .streams import Wanted
 from .timing import SystemTime
-from .transport import Plain, Sealed, Transport
+from .transport import Plain, Sealed
 
 _CONNECT_S = 5.0
 _READ_BYTES = 65_536
+_REST_NS, _BLOCKED_NS = 250_000_000, 100_000_000
+"""How long its thread waits at most."""
 
 
 class Client(Shell):
@@ -45,10 +46,10 @@ class Client(Shell):
         super().__init__(server, own, settings, context)
         self._mutex = threading.RLock()
         self._lock = threading.Condition(self._mutex)
+        self._for_others = _Locked(self)
         self._hosts: list[ModuleHost] = []
-        self._wake_out, self._wake_in = socket.socketpair()
-        for end in (self._wake_in, self._wake_out):
-            end.setblocking(False)
+        self._ears = Ears()
+        self._rests_until_ns = 0
         self._thread = threading.Thread(target=self._run, name="rohrpost", daemon=True)
         self._thread.start()
 
@@ -82,14 +83,9 @@ class Client(Shell):
                 self._check()
                 raise not_connected(self._core)
 
-    @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
-        """The lock, for what others ask. After a fork a thread that is not there any more may hold it: so the process
-        is asked first."""
-        self._check()
-        with self._lock:
-            self._check()
-            yield
+    def _locked(self) -> _Locked:
+        """The lock, for what others ask."""
+        return self._for_others
 
     # Calls.
 
@@ -98,6 +94,10 @@ class Client(Shell):
         return self._describe(self._core.own, self.name(name), timeout_s)
 
     def _describe(self, endpoint: Endpoint, to: Name, timeout_s: float) -> Description:
+        self._check()
+        known = self._core.known(to)
+        if known is not None:
+            return known
         box: list[Any] = []
         done = threading.Event()
 
@@ -124,19 +124,26 @@ class Client(Shell):
         return calling.result(prepared, self._sent(endpoint, to, prepared, timeout_s))
 
     def _sent(self, endpoint: Endpoint, to: Name, prepared: calling.Prepared, timeout_s: float) -> Call:
-        done = threading.Event()
-        with self._locked():
-            now_ns = passed_ns()
-            call = endpoint.caller.begin(
-                now_ns, to, prepared.number, prepared.interface, prepared.arguments, int(timeout_s * 1e9),
-                lambda _: done.set(),
-            )  # fmt: skip
-        self._wake()
+        waiting, call, line = Waiting(self._ears), None, None
         try:
-            done.wait()
+            with self._locked():
+                now_ns = passed_ns()
+                call = endpoint.caller.begin(
+                    now_ns, to, prepared.number, prepared.interface, prepared.arguments, int(timeout_s * 1e9),
+                    waiting.over,
+                )  # fmt: skip
+                line = self._ears.lend(waiting) if self._core.session.is_up else None
+                is_soon = not self._pushed(now_ns) or call.repeat_ns < self._rests_until_ns
+            if is_soon:
+                self._wake()
+            while line is not None and not call.is_done:
+                self._ears.listen(line)
+                line = self._heard(line, call)
+            waiting.wait()
         finally:
-            if not call.is_done:
-                with self._lock:
+            with self._mutex:
+                self._ears.give_back(waiting)
+                if call is not None and not call.is_done:
                     endpoint.caller.forget(call)
         if calling.is_stale(call):
             with self._lock:
@@ -246,49 +253,91 @@ class Client(Shell):
         host.thread.start()
         self._wake()
 
+    # Its connection. One thread at a time, with the lock, reads and writes.
+
+    def _pushed(self, now_ns: int) -> bool:
+        """Writes what may leave now; whether all of it left."""
+        line = self._ears.line
+        if line is None or not self._core.session.is_up:
+            return False
+        self._core.session.speak(now_ns)
+        try:
+            if self._core.session.has_ready or line.transport.pending():
+                self._write(line)
+        except (OSError, NoConnection) as error:
+            line.broken = error
+        return line.broken is None and not line.transport.pending()
+
+    def _heard(self, line: Line, call: Call) -> Line | None:
+        """Reads as a thread that listens; none: there is nothing to listen to any more."""
+        with self._mutex:
+            if line is not self._ears.line or line.broken is not None:
+                return None
+            is_all, before = False, self._core.session.heard
+            try:
+                self._read(line)
+                is_all = self._pushed(passed_ns())
+            except (OSError, NoConnection) as error:
+                line.broken = error
+            except BaseException:
+                line.broken = NoConnection("a thread that read was interrupted")
+                raise
+            finally:
+                if not (is_all and call.is_done and self._core.session.heard == before + 1):
+                    # There was more than the answer: the core is to be asked what follows from it.
+                    self._wake()
+            return line if line.broken is None and self._core.session.is_up else None
+
+    def _write(self, line: Line) -> None:
+        pending, session = line.transport.pending(), self._core.session
+        if not pending and line.transport.is_ready:
+            ready = session.ready()
+            if ready:
+                line.transport.write(ready)
+            session.took(passed_ns(), len(ready))
+        if pending:
+            with contextlib.suppress(BlockingIOError):
+                del pending[: line.stream.send(pending)]
+
+    def _read(self, line: Line) -> None:
+        try:
+            data = line.stream.recv(_READ_BYTES)
+        except BlockingIOError:
+            return
+        if not data:
+            raise NoConnection("the TCP router closed the connection")
+        self._core.received(passed_ns(), line.transport.read(data))
+        self._lock.notify_all()
+
     # The thread.
 
     def _wake(self) -> None:
-        try:
-            self._wake_out.send(b"\0")
-        except (BlockingIOError, OSError):
-            # It is awake, or closed.
-            return
+        self._ears.wake()
 
     def _run(self) -> None:
-        selector = selectors.DefaultSelector()
-        selector.register(self._wake_in, selectors.EVENT_READ)
-        line: _Line | None = None
         try:
             while not self._is_closed:
                 with self._lock:
-                    step, until_ns = self._core.poll(passed_ns())
+                    now_ns = passed_ns()
+                    step, until_ns = self._core.poll(now_ns)
+                    self._rests_until_ns = min(until_ns, now_ns + _REST_NS) if step is Step.WAIT else now_ns + _REST_NS
                     self._lock.notify_all()
                 if step is Step.CONNECT:
-                    line = self._connect(selector)
+                    self._connect()
                 elif step is Step.CLOSE:
-                    self._drop(selector, line)
-                    line = None
+                    with self._lock:
+                        self._ears.drop()
                 else:
-                    line = self._turn(selector, line, step, until_ns)
+                    self._turn(step)
         finally:
             with self._lock:
                 # However it ends, nobody waits for it any more.
                 self._is_closed = True
                 self._core.close("this client is closed")
                 self._lock.notify_all()
-            self._drop(selector, line)
-            selector.close()
-            self._wake_in.close()
-            self._wake_out.close()
+                self._ears.close()
 
-    @staticmethod
-    def _drop(selector: selectors.BaseSelector, line: _Line | None) -> None:
-        if line is not None:
-            selector.unregister(line.stream)
-            line.stream.close()
-
-    def _connect(self, selector: selectors.BaseSelector) -> _Line | None:
+    def _connect(self) -> None:
         why = ""
         try:
             stream = socket.create_connection(self._server, timeout=_CONNECT_S)
@@ -298,64 +347,53 @@ class Client(Shell):
             why = f"the TCP router at {host}:{port} is not reached: {error}"
         with self._lock:
             if why:
-                self._core.session.closed(passed_ns(), why)
-                return None
+                return self._core.session.closed(passed_ns(), why)
             stream.setblocking(False)
-            selector.register(stream, selectors.EVENT_READ)
             self._core.session.connected(passed_ns())
-            return _Line(stream, Plain() if self._context is None else Sealed(self._context))
+            self._ears.line = Line(stream, Plain() if self._context is None else Sealed(self._context))
 
-    def _turn(self, selector: selectors.BaseSelector, line: _Line | None, step: Step, until_ns: int) -> _Line | None:
+    def _turn(self, step: Step) -> None:
         try:
-            if line is not None:
-                self._write(line)
-                events = selectors.EVENT_READ | (selectors.EVENT_WRITE if line.transport.pending() else 0)
-                selector.modify(line.stream, events)
-            takes_more = line is not None and line.transport.is_ready and not line.transport.pending()
-            # A stream that takes nothing now, or is not sealed yet, is looked at again when something comes.
-            wait_ns = until_ns - passed_ns() if step is Step.WAIT else 0 if takes_more else 100_000_000
-            for key, _ in selector.select(max(0.0, min(wait_ns, 250_000_000) / 1e9)):
-                if key.fileobj is self._wake_in:
-                    self._wake_in.recv(4096)
-                elif line is not None:
-                    self._read(line)
+            with self._lock:
+                line, now_ns = self._ears.line, passed_ns()
+                if line is not None:
+                    self._write_all(line)
+                takes_more = line is not None and line.transport.is_ready and not line.transport.pending()
+                # A stream that takes nothing now, or is not sealed yet, is looked at again when something comes.
+                if step is not Step.WAIT:
+                    self._rests_until_ns = now_ns + (0 if takes_more else _BLOCKED_NS)
+                rest_ns = self._rests_until_ns - now_ns
+            if self._ears.select(max(0, rest_ns) / 1e9):
+                with self._lock:
+                    if line is not None:
+                        self._read(line)
         except Exception as error:  # Nothing that comes may end this thread, and with it all that is hosted here.
             why = broken(error)
             with self._lock:
                 self._core.session.closed(passed_ns(), why)
-            self._drop(selector, line)
-            return None
-        return line
+                self._ears.drop()
 
-    def _write(self, line: _Line) -> None:
-        pending = line.transport.pending()
-        if not pending and line.transport.is_ready:
-            with self._lock:
-                ready = self._core.session.ready()
-                line.transport.write(ready)
-                self._core.session.took(passed_ns(), len(ready))
-        if pending:
-            try:
-                del pending[: line.stream.send(pending)]
-            except BlockingIOError:
-                return
+    def _write_all(self, line: Line) -> None:
+        if line.broken is not None:
+            raise line.broken
+        self._write(line)
+        self._ears.watch()
 
-    def _read(self, line: _Line) -> None:
+
+class _Locked:
+    """A client's lock. After a fork a thread that is not there any more may hold it: so the process is asked first."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+
+    def __enter__(self) -> None:
+        self._client._check()
+        self._client._mutex.acquire()
         try:
-            data = line.stream.recv(_READ_BYTES)
-        except BlockingIOError:
-            return
-        if not data:
-            raise NoConnection("the TCP router closed the connection")
-        plain = line.transport.read(data)
-        with self._lock:
-            self._core.received(passed_ns(), plain)
-            self._lock.notify_all()
+            self._client._check()
+        except BaseException:
+            self._client._mutex.release()
+            raise
 
-
-class _Line:
-    """A connection."""
-
-    def __init__(self, stream: socket.socket, transport: Transport) -> None:
-        self.stream = stream
-        self.transport = transport
+    def __exit__(self, *_: object) -> None:
+        self._client._mutex.release()

@@ -201,7 +201,7 @@ class Core:
 
     def describe(self, endpoint: Endpoint, to: Name, timeout_ns: int, done: Callable[[Any], None]) -> None:
         """``done`` gets the description, at once if it is known, or a :class:`CallError`."""
-        known = self._descriptions.get(to)
+        known = self.known(to)
         if known is not None:
             return done(known)
 
@@ -213,6 +213,10 @@ class Core:
             done(result)
 
         Describing(endpoint.caller, lambda: self.now_ns, to, timeout_ns, described)
+
+    def known(self, to: Name) -> Description | None:
+        """What a module offers, if it was asked already."""
+        return self._descriptions.get(to)
 
     def forget(self, to: Name) -> None:
         """A module's interface has changed: it is asked for anew."""

@@ -155,6 +155,8 @@ class Session:
         self._attempt = 0
         self._backoff = Backoff(settings.incarnation)
         self._splitter = Splitter()
+        self.heard = 0
+        """Messages that came so far."""
         self._waiting = _Waiting(settings.quota_bytes)
         self._out = bytearray()
         self._taken = 0
@@ -214,6 +216,11 @@ class Session:
         self._register_ns, self._holds = now_ns, False
         self._out = bytearray()
 
+    @property
+    def has_ready(self) -> bool:
+        """Whether there are bytes to be written."""
+        return bool(self._out)
+
     def ready(self) -> bytes:
         """Bytes to be written."""
         return bytes(self._out)
@@ -250,7 +257,7 @@ class Session:
         if gone is not None:
             self.closed(now_ns, gone)
             return Step.CLOSE, 0
-        self._speak(now_ns)
+        self.speak(now_ns)
         if self._out and not self._is_blocked:
             return Step.WRITE, 0
         return Step.WAIT, self._look_ns
@@ -268,7 +275,8 @@ class Session:
         silent = self._asking.is_silent(now_ns, self._heard_ns, self._moved_ns, since is not None)
         return "nothing came from the TCP router for too long" if silent else None
 
-    def _speak(self, now_ns: int) -> None:
+    def speak(self, now_ns: int) -> None:
+        """Makes ready what may leave now; :meth:`poll` does, too."""
         if self._state is not State.MEMBER:
             return
         if self._asking.is_due(now_ns):
@@ -301,6 +309,7 @@ class Session:
                 self._over(str(bad))
 
     def _handle(self, now_ns: int, message: frames.Message) -> None:
+        self.heard += 1
         if isinstance(message, Refused):
             if message.is_hopeless:
                 self._backoff.hopeless()
@@ -347,8 +356,8 @@ class Session:
         session = self.clock.session(now_ns)
         is_old = session is not None and carried.published and sum(session) - carried.published > AGE_NS_MAX
         if not is_old:
-            package = carried.package
-            self._deliver(now_ns, replace(package, head=package.head.capped()))
+            package, head = carried.package, carried.package.head.capped()
+            self._deliver(now_ns, package if head is package.head else replace(package, head=head))
 
     def _say(self, is_up: bool, words: str) -> None:
         if words != self._said:

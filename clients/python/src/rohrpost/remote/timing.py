@@ -114,6 +114,7 @@ class ServerClock:
 
     def __init__(self) -> None:
         self._kept: list[_Sample] = []
+        self._best: _Sample | None = None
 
     def heard(self, now_ns: int, answer: Answer) -> None:
         """An answer was read."""
@@ -129,13 +130,13 @@ class ServerClock:
             # One of both ends slept, or its clock was set.
             self._kept.clear()
         self._kept = [*self._kept[1 - _KEPT :], sample]
+        # All of them age alike.
+        self._best = min(self._kept, key=lambda sample: sample.error_ns(now_ns))
 
     def session(self, now_ns: int) -> tuple[int, int] | None:
         """The server's session clock, and how far off that is at most; ns."""
-        if not self._kept:
-            return None
-        best = min(self._kept, key=lambda sample: sample.error_ns(now_ns))
-        return best.session_ns(now_ns), best.error_ns(now_ns)
+        best = self._best
+        return None if best is None else (best.session_ns(now_ns), best.error_ns(now_ns))
 
     def round_trip_ns(self) -> int | None:
         """The shortest way there and back of late, ns."""

@@ -18,17 +18,30 @@ import struct
 from typing import Any
 
 from .errors import WalkError, counted, plain
+from .readers import READERS, Lend
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
 
 
-def decode(type: Type, data: bytes) -> Any:
-    """The value that all of ``data`` holds. Raises :class:`WalkError`, with the path to where it showed."""
-    value, left = decode_front(type, data)
+def decode(type: Type, data: bytes | memoryview, lend: Lend = None) -> Any:
+    """The value that all of ``data`` holds. ``lend``: what ``bytes`` in it become, by where they begin and end; else
+    they are copied. Raises :class:`WalkError`, with the path to where it showed."""
+    read = READERS.of(type)
+    if read is not None:
+        try:
+            value, end = read(data, 0, lend)
+            if end == len(data):
+                return value
+        except Exception:  # Also what an author's class raises.
+            pass  # What is wrong, and where, is found below.
+    decoder = Decoder(data, lend)
+    value = decoder.value(type)
+    left = len(data) - decoder.at
     if left:
         raise WalkError(f"{counted(left, 'byte')} too many")
+    READERS.used(type)
     return value
 
 
@@ -51,8 +64,9 @@ def made(python: Any, *values: Any, **named: Any) -> Any:
 class Decoder:
     """Reads one value after the other."""
 
-    def __init__(self, data: bytes | memoryview) -> None:
+    def __init__(self, data: bytes | memoryview, lend: Lend = None) -> None:
         self.data = data
+        self.lend = lend
         self.at = 0
         self.depth = 0
         self.empty_left = EMPTY_MAX
@@ -204,7 +218,11 @@ class Decoder:
 
     def octets(self) -> Any:
         """Bytes that are a value."""
-        return self.counted()
+        if self.lend is None:
+            return self.counted()
+        length = self.varint(64)
+        start = self.skip(length)
+        return self.lend(start, self.at)
 
     def take(self, length: int) -> bytes:
         start = self.skip(length)

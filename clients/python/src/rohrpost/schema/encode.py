@@ -20,6 +20,7 @@ from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, F32, F64, TEXT, U8, UNIT, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, is_byte, is_nullable, is_word, unwrapped,
 )  # fmt: skip
+from .writers import UNWRITTEN, WRITERS
 
 _BYTES = (bytes, bytearray, memoryview)
 _WHOLE_FLOAT_MAX = 2.0**53
@@ -27,8 +28,17 @@ _WHOLE_FLOAT_MAX = 2.0**53
 
 def encode(type: Type, value: Any) -> bytes:
     """The bytes that a value of this type has. Raises :class:`WalkError`, with the path to what does not fit."""
+    write = WRITERS.of(type)
+    if write is not None:
+        out = bytearray()
+        try:
+            write(out, value)
+            return bytes(out)
+        except UNWRITTEN:
+            pass  # It may have another form; what is wrong, and where, is found below.
     encoder = _Encoder()
     encoder.value(type, value)
+    WRITERS.used(type)
     return bytes(encoder.out)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Union
@@ -20,8 +21,15 @@ NAMES = (
 """Types that are their tag alone, by their tag."""
 
 
+class _Kept:
+    """What a type is kept with beside its fields (:mod:`.kept`) stays behind where it is copied to."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if not name.startswith("_")}
+
+
 @dataclass(frozen=True)
-class Plain:
+class Plain(_Kept):
     """A type that is its tag alone."""
 
     tag: int
@@ -45,14 +53,14 @@ UNIT, BOOL, U8, U16, U32, U64, U128, I8, I16, I32, I64, I128, F32, F64, CHAR, TE
 
 
 @dataclass(frozen=True)
-class Option:
+class Option(_Kept):
     """A value or none."""
 
     inner: Type
 
 
 @dataclass(frozen=True)
-class List:
+class List(_Kept):
     """Any number of one type."""
 
     element: Type
@@ -64,7 +72,7 @@ class List:
 
 
 @dataclass(frozen=True)
-class Array:
+class Array(_Kept):
     """A fixed number of one type."""
 
     length: int
@@ -72,7 +80,7 @@ class Array:
 
 
 @dataclass(frozen=True)
-class Map:
+class Map(_Kept):
     """Keys, and what belongs to each."""
 
     key: Type
@@ -85,7 +93,7 @@ class Map:
 
 
 @dataclass(frozen=True)
-class Tuple:
+class Tuple(_Kept):
     """One after the other."""
 
     elements: tuple[Type, ...]
@@ -118,15 +126,25 @@ class Named:
 
 
 @dataclass(frozen=True)
-class Struct:
+class Struct(_Kept):
     """A struct. ``python``: the class of its values; none: they are dicts."""
 
     named: Named
     python: Any = field(default=None, compare=False, repr=False)
 
 
+class Members:
+    """``python`` of an enum that is an ``enum.Enum``: its members, which nobody changes, by name."""
+
+    def __init__(self, by_name: Mapping[str, Any]) -> None:
+        self._by_name = dict(by_name)
+
+    def __call__(self, chosen: str, _: Any) -> Any:
+        return self._by_name[chosen]
+
+
 @dataclass(frozen=True)
-class Enum:
+class Enum(_Kept):
     """An enum. ``python``: the class of its values; none: they are :class:`Variant`."""
 
     name: str
@@ -172,6 +190,12 @@ def is_nullable(type: Type) -> bool:
 def is_byte(type: Type) -> bool:
     """Whether a list of it is a string of bytes."""
     return unwrapped(type) == U8
+
+
+def float_of(type: Type) -> str:
+    """As :mod:`struct` calls a number with a point; empty: it is none."""
+    type = unwrapped(type)
+    return "f" if type == F32 else "d" if type == F64 else ""
 
 
 def is_empty(type: Type) -> bool:

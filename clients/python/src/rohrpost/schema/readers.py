@@ -1,0 +1,404 @@
+"""Readers of a type, which are made once: closures that know what comes next, and ask nothing of the type any more.
+
+::
+
+    decode ──▶ reader ── the value
+                  └─ Unread, or the bytes end ─▶ Decoder, which reads all anew and says what is wrong, and where
+
+So errors have one place that words them. What :class:`.decode.Decoder` counts while it reads, depth and values without
+bytes, is bounded here before a reader is made: a type that may go beyond has none.
+"""
+
+from __future__ import annotations
+
+import inspect
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Optional
+
+from .kept import Kept
+from .tree import (
+    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Members, Named, Option, Plain,
+    Struct, Tuple, Type, Variant, float_of, is_byte, is_nullable, unwrapped,
+)  # fmt: skip
+
+Lend = Optional[Callable[[int, int], Any]]
+"""What ``bytes`` from here to there become, if they are a value; none: they are copied."""
+Reader = Callable[[Any, int, Lend], tuple[Any, int]]
+"""From bytes, and where a value begins in them: the value, and where it ends."""
+
+
+class Unread(Exception):
+    """These bytes are for :class:`.decode.Decoder`."""
+
+
+UNREAD = (Unread, IndexError, struct.error, UnicodeDecodeError)
+"""What a reader raises of bytes that do not fit."""
+
+
+def reader_of(type: Type) -> Reader | None:
+    """Makes a reader of a type; none: it nests too deep, or may have too many values that take no bytes."""
+    try:
+        made = _Maker().made(type, 0)
+    except Unread:
+        return None
+    return made.read if made.empties <= EMPTY_MAX else None
+
+
+READERS = Kept("reader", reader_of)
+
+
+@dataclass
+class _Made:
+    """A reader. ``empties``: values that take no bytes in one that is read, at most. ``bits``: of whole numbers without
+    a sign, which a struct reads itself: that is quicker than to call."""
+
+    read: Reader
+    empties: int = 0
+    is_empty: bool = False
+    depth: int = 1
+    bits: int = 0
+
+    @property
+    def part(self) -> Reader | int:
+        """As a part of several."""
+        return self.bits or self.read
+
+
+class _Maker:
+    """Makes the readers of one type; a part that it has several times has one reader."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, _Made] = {}
+
+    def made(self, type: Type, depth: int) -> _Made:
+        type = unwrapped(type)
+        found = self._known.get(id(type))
+        if found is None:
+            if depth >= DEPTH_MAX:
+                raise Unread
+            found = self._known[id(type)] = self._of(type, depth + 1)
+            found.empties += found.is_empty
+        if depth + found.depth > DEPTH_MAX:
+            raise Unread
+        return found
+
+    def _of(self, type: Type, depth: int) -> _Made:
+        if isinstance(type, Plain):
+            signed, bits = type.integer or (True, 0)
+            return _Made(_plain(type), 0, type.tag == 0, 1, 0 if signed or bits == 8 else bits)
+        if isinstance(type, Option):
+            inner = self.made(type.inner, depth)
+            return _around(_option(inner.read, is_nullable(type.inner)), inner)
+        if isinstance(type, List):
+            return _Made(_octets) if is_byte(type.element) else self._list(type, depth)
+        if isinstance(type, Array):
+            inner = self.made(type.element, depth)
+            empties = min(type.length * inner.empties, EMPTY_MAX + 1)
+            read = _many(inner.read, float_of(type.element), type.length)
+            return _Made(read, empties, inner.is_empty or not type.length, inner.depth + 1)
+        if isinstance(type, Tuple):
+            inners = [self.made(it, depth) for it in type.elements]
+            return _together(_several([it.part for it in inners], _as_tuple), inners)
+        if isinstance(type, Map):
+            return self._map(type, depth)
+        if isinstance(type, Struct):
+            return self._struct(type, depth)
+        return self._enum(type, depth)
+
+    def _list(self, type: List, depth: int) -> _Made:
+        inner = self.made(type.element, depth)
+        if inner.empties:
+            raise Unread
+        return _around(_many(inner.read, float_of(type.element), None), inner)
+
+    def _map(self, type: Map, depth: int) -> _Made:
+        # A pair is one more that nests, where the value is a list of them.
+        inners = [self.made(it, depth + (not type.has_words)) for it in (type.key, type.value)]
+        if inners[0].empties or inners[1].empties:
+            raise Unread
+        made = _together(_map(inners[0].read, inners[1].read, type.has_words), inners)
+        made.depth += not type.has_words
+        return made
+
+    def _members(self, named: Named, depth: int) -> list[_Made]:
+        return [self.made(field.type, depth) for field in named.fields]
+
+    def _struct(self, type: Struct, depth: int) -> _Made:
+        named, python = type.named, type.python
+        if python is not None and named.kind == 2:
+            raise Unread
+        inners = self._members(named, depth) if named.kind else []
+        names = [field.name for field in named.fields]
+        if named.kind == 0:
+            return _Made(_nothing if python is None else _made_of_nothing(python), 0, True)
+        make = _payload(named) if python is None else _called(python, names)
+        return _together(_several([it.part for it in inners], make), inners)
+
+    def _enum(self, type: Enum, depth: int) -> _Made:
+        variants: list[_Chosen] = []
+        python = Variant if type.python is None else type.python
+        # What nobody can change is the same each time.
+        is_fixed = type.python is None or isinstance(type.python, Members)
+        inners: list[_Made] = []
+        for variant in type.variants:
+            its = self._members(variant, depth) if variant.kind else []
+            inners += its
+            read = its[0].read if variant.kind == 1 else None
+            if variant.kind > 1:
+                read = _several([it.part for it in its], _payload(variant))
+            fixed = python(variant.name, None) if is_fixed and not variant.kind else None
+            variants.append((fixed, variant.name, read))
+        made = _together(_enum(variants, python), inners)
+        made.is_empty = False
+        return made
+
+
+def _around(read: Reader, inner: _Made) -> _Made:
+    return _Made(read, inner.empties, False, inner.depth + 1)
+
+
+def _together(read: Reader, inners: list[_Made]) -> _Made:
+    empties = min(sum(it.empties for it in inners), EMPTY_MAX + 1)
+    is_empty = all(it.is_empty for it in inners)
+    return _Made(read, empties, is_empty, max((it.depth for it in inners), default=0) + 1)
+
+
+# What makes values.
+
+
+def _as_tuple(*values: Any) -> Any:
+    return values
+
+
+def _payload(named: Named) -> Callable[..., Any]:
+    if named.kind != 3:
+        return _as_tuple
+    names = [field.name for field in named.fields]
+    return lambda *values: dict(zip(names, values))
+
+
+def _called(python: Any, names: list[str]) -> Callable[..., Any]:
+    """By position, which is quicker, where that says the same."""
+    try:
+        takes = list(inspect.signature(python).parameters.values())
+    except (TypeError, ValueError):
+        takes = []
+    if [it.name for it in takes] == names and all(it.kind is it.POSITIONAL_OR_KEYWORD for it in takes):
+        return python  # type: ignore[no-any-return]
+    return lambda *values: python(**dict(zip(names, values)))
+
+
+# Readers.
+
+
+def _nothing(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+    return None, at
+
+
+def _made_of_nothing(python: Any) -> Reader:
+    return lambda data, at, lend: (python(), at)
+
+
+def _long(data: Any, at: int, bits: int) -> tuple[int, int]:
+    number = shift = 0
+    while shift < bits:
+        byte = data[at]
+        at += 1
+        number |= (byte & 0x7F) << shift
+        if byte < 0x80:
+            if number >> bits:
+                break
+            return number, at
+        shift += 7
+    raise Unread
+
+
+def _unsigned(bits: int) -> Reader:
+    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+        byte = data[at]
+        if byte < 0x80:
+            return byte, at + 1
+        second = data[at + 1]
+        if second < 0x80:
+            return byte & 0x7F | second << 7, at + 2
+        return _long(data, at, bits)
+
+    return read
+
+
+def _signed(bits: int) -> Reader:
+    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+        number, at = _long(data, at, bits)
+        return number >> 1 ^ -(number & 1), at
+
+    return read
+
+
+def _u8(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+    return data[at], at + 1
+
+
+def _i8(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+    byte = data[at]
+    return byte - 256 if byte > 127 else byte, at + 1
+
+
+def _bool(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+    byte = data[at]
+    if byte > 1:
+        raise Unread
+    return byte == 1, at + 1
+
+
+def _f64(data: Any, at: int, lend: Lend, read: Any = struct.Struct("<d").unpack_from) -> tuple[Any, int]:
+    return read(data, at)[0], at + 8
+
+
+def _f32(data: Any, at: int, lend: Lend, read: Any = struct.Struct("<f").unpack_from) -> tuple[Any, int]:
+    return read(data, at)[0], at + 4
+
+
+def _span(data: Any, at: int) -> tuple[int, int]:
+    """Where counted bytes begin and end."""
+    length = data[at]
+    if length < 0x80:
+        at += 1
+    else:
+        length, at = _long(data, at, 64)
+    end = at + length
+    if end > len(data):
+        raise Unread
+    return at, end
+
+
+def _octets(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+    length, at = _long(data, at, 64)
+    end = at + length
+    if end > len(data):
+        raise Unread
+    return bytes(data[at:end]) if lend is None else lend(at, end), end
+
+
+def _text(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+    at, end = _span(data, at)
+    return str(data[at:end], "utf-8"), end
+
+
+def _char(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+    text, at = _text(data, at, lend)
+    if len(text) != 1:
+        raise Unread
+    return text, at
+
+
+_PLAIN: dict[Plain, Reader] = {BOOL: _bool, F32: _f32, F64: _f64, TEXT: _text, BYTES: _octets, CHAR: _char}
+
+
+def _plain(type: Plain) -> Reader:
+    if type.integer is None:
+        return _PLAIN.get(type, _nothing)
+    signed, bits = type.integer
+    if bits == 8:
+        return _i8 if signed else _u8
+    return _signed(bits) if signed else _unsigned(bits)
+
+
+def _option(inner: Reader, is_marked: bool) -> Reader:
+    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+        byte = data[at]
+        if byte > 1:
+            raise Unread
+        if not byte:
+            return None, at + 1
+        value, at = inner(data, at + 1, lend)
+        return Variant("Some", value) if is_marked else value, at
+
+    return read
+
+
+def _claimed(data: Any, at: int) -> tuple[int, int]:
+    """How many elements; each of them takes a byte at least."""
+    length = data[at]
+    if length < 0x80:
+        at += 1
+    else:
+        length, at = _long(data, at, 64)
+    if length > len(data) - at:
+        raise Unread
+    return length, at
+
+
+def _many(inner: Reader, as_float: str, fixed: int | None) -> Reader:
+    size = struct.calcsize(as_float)
+
+    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+        length, at = _claimed(data, at) if fixed is None else (fixed, at)
+        if as_float:
+            end = at + length * size
+            if end > len(data):
+                raise Unread
+            return list(struct.unpack_from(f"<{length}{as_float}", data, at)), end
+        values = []
+        for _ in range(length):
+            value, at = inner(data, at, lend)
+            values.append(value)
+        return values, at
+
+    return read
+
+
+def _several(inners: list[Reader | int], make: Callable[..., Any]) -> Reader:
+    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+        values = []
+        for inner in inners:
+            if not isinstance(inner, int):
+                value, at = inner(data, at, lend)
+            else:
+                value = data[at]
+                if value < 0x80:
+                    at += 1
+                else:
+                    second = data[at + 1]
+                    if second < 0x80:
+                        value, at = value & 0x7F | second << 7, at + 2
+                    else:
+                        value, at = _long(data, at, inner)
+            values.append(value)
+        return make(*values), at
+
+    return read
+
+
+def _map(key: Reader, value: Reader, has_words: bool) -> Reader:
+    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+        length, at = _claimed(data, at)
+        pairs = []
+        for _ in range(length):
+            first, at = key(data, at, lend)
+            second, at = value(data, at, lend)
+            pairs.append((first, second))
+        return dict(pairs) if has_words else pairs, at
+
+    return read
+
+
+_Chosen = tuple[Any, str, Optional[Reader]]
+"""A variant: its value, if that is always the same; its name; and what reads its payload, if there is one."""
+
+
+def _enum(variants: list[_Chosen], make: Callable[[str, Any], Any]) -> Reader:
+    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
+        index = data[at]
+        if index < 0x80:
+            at += 1
+        else:
+            index, at = _long(data, at, 32)
+        fixed, name, inner = variants[index]
+        if inner is None:
+            return make(name, None) if fixed is None else fixed, at
+        value, at = inner(data, at, lend)
+        return make(name, value), at
+
+    return read
