@@ -1,7 +1,7 @@
 //! The module's context, as functions of Python reach it: lent to the thread for one call of the module's code.
 
 use crate::fails::misuse;
-use crate::streams::drop_left;
+use crate::owned::drop_left;
 use pyo3::prelude::*;
 use rohrpost_native::NativeContext;
 use std::cell::Cell;

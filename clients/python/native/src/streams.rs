@@ -3,14 +3,12 @@
 use crate::calls::apart;
 use crate::fails::{failure, misuse};
 use crate::lent::{is_forked, require_own_process, with};
+use crate::owned::{Owned, drop_left};
 use crate::values::staying;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use rohrpost_native::schema::Field;
 use rohrpost_native::{Around, Moment, NativeError, NativeStream, Next, StayingRecord};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
-use std::thread::{self, ThreadId};
 use std::time::Duration;
 
 /// Sequence, stamp (ns), epoch, and the value as `bytes` or `Shared`.
@@ -18,32 +16,6 @@ type RecordParts = (u64, u64, u64, Py<PyAny>);
 
 /// Sequence and stamp (ns) of a record.
 type Mark = (u64, u64);
-
-/// A stream, and the thread that opened it.
-struct Owned {
-    stream: NativeStream,
-    thread: ThreadId,
-}
-
-// SAFETY: the thread that opened it alone uses and drops the stream (`Stream::own`, `Stream::drop`, `drop_left`); in
-// others it is moved at most.
-unsafe impl Send for Owned {}
-// SAFETY: as above; nothing is read of it by a shared borrow but the thread.
-unsafe impl Sync for Owned {}
-
-/// Streams that the garbage collector met in another thread than theirs.
-static LEFT: Mutex<Vec<Owned>> = Mutex::new(Vec::new());
-/// Whether there may be any.
-static HAS_LEFT: AtomicBool = AtomicBool::new(false);
-
-/// Drops the streams of this thread, a module's, that were left elsewhere: their seats are free then.
-pub(crate) fn drop_left() {
-    // ORDERING: Relaxed; the mutex orders what is behind it, and a stream that is seen later is dropped later.
-    if HAS_LEFT.load(Ordering::Relaxed) && HAS_LEFT.swap(false, Ordering::Relaxed) {
-        let here = thread::current().id();
-        LEFT.lock().unwrap_or_else(PoisonError::into_inner).retain(|left| left.thread != here);
-    }
-}
 
 /// A stream of another module, for the thread that opened it.
 #[pyclass(module = "rohrpost._node")]
@@ -53,9 +25,8 @@ impl Stream {
     /// For the thread that opened it, in the process that did.
     fn own(&mut self, py: Python<'_>) -> PyResult<&mut NativeStream> {
         require_own_process(py)?;
-        let own = self.0.as_mut().filter(|owned| owned.thread == thread::current().id());
         let elsewhere = || misuse(py, "a stream is for the thread that opened it, that of its module");
-        own.map(|owned| &mut owned.stream).ok_or_else(elsewhere)
+        self.0.as_mut().and_then(Owned::stream).ok_or_else(elsewhere)
     }
 }
 
@@ -65,10 +36,8 @@ impl Drop for Stream {
         if is_forked() {
             // Its seat is the parent's.
             std::mem::forget(owned);
-        } else if owned.thread != thread::current().id() {
-            LEFT.lock().unwrap_or_else(PoisonError::into_inner).push(owned);
-            // ORDERING: Relaxed; as above.
-            HAS_LEFT.store(true, Ordering::Relaxed);
+        } else {
+            owned.end();
         }
     }
 }
@@ -83,7 +52,7 @@ pub(crate) fn open_stream(py: Python<'_>, module: &str, item: &str, timeout_s: f
         let stream = opened.map_err(|error| failure(py, error))?;
         let field: &Field = &stream.item.field;
         let field = PyBytes::new(py, &field.to_bytes()).unbind();
-        Ok((Stream(Some(Owned { stream, thread: thread::current().id() })), field))
+        Ok((Stream(Some(Owned::new(stream))), field))
     })
 }
 
