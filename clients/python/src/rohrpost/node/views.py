@@ -43,7 +43,7 @@ class View:
         self._array = weakref.ref(array)
         whole = memoryview(array).cast("B")
         self.whole = whole if is_writable else whole.toreadonly()
-        self._lent = [whole, self.whole]
+        self._lent = [self.whole]
 
     def lend(self, start: int, end: int) -> memoryview | bytes:
         """Some of them, if they are many; else a copy."""

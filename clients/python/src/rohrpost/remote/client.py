@@ -1,7 +1,7 @@
 """The synchronous client: a shell around the core with a socket, a thread and a lock.
 
-One thread reads and writes, or while calls wait one of those (:mod:`.line`); each hosted module has a thread of its own,
-which runs its functions one after the other. All methods may be called from any thread.
+One thread reads and writes, or while calls wait one of theirs (:mod:`.line`); each hosted module has a thread of its
+own, which runs its functions one after the other. All methods may be called from any thread.
 """
 
 from __future__ import annotations

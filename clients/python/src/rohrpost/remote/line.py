@@ -5,8 +5,9 @@
     the client's own thread ── selects ──▶ socket        as a rule
     a thread that calls     ── polls ────▶ socket        while it waits for its answer: nothing is handed over then
 
-Whoever reads or writes holds the client's lock meanwhile, so the order of bytes is that of the stream. The client's own
-thread looks at the socket from time to time even so: one that calls may be held up by a handler of signals.
+The thread that reads or writes holds the client's lock meanwhile, so the order of bytes is that of the stream. The
+client's own thread looks at the socket from time to time even so: one that calls may be held up by a handler of
+signals.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ _CAN_LEND = hasattr(select, "epoll")
 
 
 class Line:
-    """A connection. ``number``: of its socket; ``broken``: why its bytes are not read any more; the client's own thread ends it then."""
+    """A connection. ``number``: of its socket; ``broken``: why its bytes are not read any more; the client's own thread
+    ends it then."""
 
     def __init__(self, stream: socket.socket, transport: Transport) -> None:
         self.stream = stream
@@ -60,8 +62,8 @@ class Waiting:
 
 
 class Ears:
-    """What the client's own thread waits for. ``listener``: who waits for the socket in its place. All but
-    :meth:`select` and :meth:`listen` is for those that hold the client's lock."""
+    """What the client's own thread waits for. ``listener``: a call's thread that waits for the socket in its
+    place. All but :meth:`select` and :meth:`listen` is for those that hold the client's lock."""
 
     def __init__(self) -> None:
         self.line: Line | None = None

@@ -18,17 +18,19 @@ import struct
 from typing import Any
 
 from .errors import WalkError, counted, plain
-from .readers import READERS, Lend
+from .readers import READERS, Lend, Reader
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
 
+_READER = READERS.name
+
 
 def decode(type: Type, data: bytes | memoryview, lend: Lend = None) -> Any:
     """The value that all of ``data`` holds. ``lend``: what ``bytes`` in it become, by where they begin and end; else
     they are copied. Raises :class:`WalkError`, with the path to where it showed."""
-    read = READERS.of(type)
+    read: Reader | None = type.__dict__.get(_READER)
     if read is not None:
         try:
             value, end = read(data, 0, lend)

@@ -20,15 +20,16 @@ from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, F32, F64, TEXT, U8, UNIT, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, is_byte, is_nullable, is_word, unwrapped,
 )  # fmt: skip
-from .writers import UNWRITTEN, WRITERS
+from .writers import UNWRITTEN, WRITERS, Writer
 
 _BYTES = (bytes, bytearray, memoryview)
 _WHOLE_FLOAT_MAX = 2.0**53
+_WRITER = WRITERS.name
 
 
 def encode(type: Type, value: Any) -> bytes:
     """The bytes that a value of this type has. Raises :class:`WalkError`, with the path to what does not fit."""
-    write = WRITERS.of(type)
+    write: Writer | None = type.__dict__.get(_WRITER)
     if write is not None:
         out = bytearray()
         try:

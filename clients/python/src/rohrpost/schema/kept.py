@@ -15,17 +15,13 @@ class Kept(Generic[T]):
     need none."""
 
     def __init__(self, name: str, make: Callable[[Type], T | None]) -> None:
-        self._name, self._make = f"_{name}", make
-
-    def of(self, type: Type) -> T | None:
-        """That of this type, if there is one."""
-        found: T | None = type.__dict__.get(self._name)
-        return found
+        self.name, self._make = f"_{name}", make
+        """Of the attribute that it is; ``type.__dict__.get(name)`` asks for it without a call."""
 
     def used(self, type: Type) -> None:
         """A value of this type was read or written without it."""
         its: dict[str, Any] = type.__dict__
-        if f"{self._name}_used" not in its:
-            its[f"{self._name}_used"] = True
-        elif self._name not in its:
-            its[self._name] = self._make(type)
+        if f"{self.name}_used" not in its:
+            its[f"{self.name}_used"] = True
+        elif self.name not in its:
+            its[self.name] = self._make(type)

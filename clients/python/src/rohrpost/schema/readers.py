@@ -33,10 +33,6 @@ class Unread(Exception):
     """These bytes are for :class:`.decode.Decoder`."""
 
 
-UNREAD = (Unread, IndexError, struct.error, UnicodeDecodeError)
-"""What a reader raises of bytes that do not fit."""
-
-
 def reader_of(type: Type) -> Reader | None:
     """Makes a reader of a type; none: it nests too deep, or may have too many values that take no bytes."""
     try:
@@ -262,11 +258,7 @@ def _f32(data: Any, at: int, lend: Lend, read: Any = struct.Struct("<f").unpack_
 
 def _span(data: Any, at: int) -> tuple[int, int]:
     """Where counted bytes begin and end."""
-    length = data[at]
-    if length < 0x80:
-        at += 1
-    else:
-        length, at = _long(data, at, 64)
+    length, at = _long(data, at, 64)
     end = at + length
     if end > len(data):
         raise Unread
@@ -274,10 +266,7 @@ def _span(data: Any, at: int) -> tuple[int, int]:
 
 
 def _octets(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    length, at = _long(data, at, 64)
-    end = at + length
-    if end > len(data):
-        raise Unread
+    at, end = _span(data, at)
     return bytes(data[at:end]) if lend is None else lend(at, end), end
 
 
@@ -320,11 +309,7 @@ def _option(inner: Reader, is_marked: bool) -> Reader:
 
 def _claimed(data: Any, at: int) -> tuple[int, int]:
     """How many elements; each of them takes a byte at least."""
-    length = data[at]
-    if length < 0x80:
-        at += 1
-    else:
-        length, at = _long(data, at, 64)
+    length, at = _long(data, at, 64)
     if length > len(data) - at:
         raise Unread
     return length, at
