@@ -33,8 +33,8 @@ def _require_rust() -> None:
     else:
         return
     raise RuntimeError(
-        f"the part in Rust of the package `rohrpost` cannot be built: {missing}. Without it a package has no modules on "
-        "the node, `rohrpost.remote` alone: set ROHRPOST_PURE=1 if that is what you want"
+        f"the part in Rust of the package `rohrpost` cannot be built: {missing}. Without it a package has no modules "
+        "on the node, `rohrpost.remote` alone: set ROHRPOST_PURE=1 if that is what you want"
     )
 
 

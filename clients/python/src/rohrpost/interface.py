@@ -46,7 +46,7 @@ class Parameter:
         type = type_of(annotation, f"{owner}.{self.name}")
         least, most = (bound_of(type, it, f"{owner}.{self.name}") for it in (self._words.min, self._words.max))
         self.field = Field(self.name.replace("_", "-"), type, self._words.text, self._words.unit, least, most)
-        self._range = tuple(None if it is None else decode(type, it) for it in (least, most))  # type: ignore[assignment]
+        self._range = (None if least is None else decode(type, least), None if most is None else decode(type, most))
         self.check(self.default, owner)
 
     def check(self, value: Any, owner: str) -> None:

@@ -57,7 +57,7 @@ class View:
         """They are lent no more; whether nothing of them was kept. Asked again, whether that holds still."""
         if self._is_free():
             return True
-        # What nobody reaches any more, such as an exception in a local of the frame where it was raised, may wait for it.
+        # What nobody reaches any more may wait for it, such as an exception in a local of the frame that caught it.
         gc.collect()
         return self._is_free()
 
