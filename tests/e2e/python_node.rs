@@ -218,10 +218,16 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
     scene.robot.wait_on(&mut scene.launch);
     let own = "for a module's own functions, in its own thread, while it runs";
     assert!(answers(&scene, "elsewhere").contains(own), "{}", answers(&scene, "elsewhere"));
-    assert!(answers(&scene, "forked").contains("this process was forked from a module's"));
+    let forked = answers(&scene, "forked");
+    let (no_part, runs) = ("this process was forked from a module's", "a module runs in this process");
+    assert!(forked.matches(no_part).count() == 2 && forked.matches(runs).count() == 2, "{forked}");
+    for words in ["locks: 0, its parent's: True", "goes on: True"] {
+        assert!(forked.contains(words), "{words}: {forked}");
+    }
     assert_eq!(answers(&scene, "strayed").trim(), "70", "a child that comes back is ended");
     let calls = answers(&scene, "calls");
     for words in [
+        "stale: no exception, but None",
         "has no function `fly`; it has: drive, halt",
         "BadArguments: the arguments cannot be written: speed_m_s: expected a number (f64), got `fast`",
         "FunctionError: NotFinite",

@@ -1,7 +1,8 @@
 """Builds this package: with its part in Rust where that can be, else without.
 
 On Linux, in a copy of the repository and with Rust installed, `maturin` builds a wheel with `rohrpost._node`, which
-modules on the node need. Everywhere else, and with ``ROHRPOST_PURE=1``, the wheel has ``rohrpost.remote`` alone.
+modules on the node need. On other systems, and with ``ROHRPOST_PURE=1``, the wheel has ``rohrpost.remote`` alone. On
+Linux it is never so by accident: what is missing is told.
 """
 
 from __future__ import annotations
@@ -13,19 +14,33 @@ import sys
 import sysconfig
 from typing import Any
 
-_FOLDER = pathlib.Path(__file__).parents[1]
+_FOLDER = pathlib.Path(__file__).resolve().parent.parent
 _MATURIN, _HATCHLING = "maturin>=1.9,<2", "hatchling>=1.18"
 
 
 def _has_rust() -> bool:
-    """Whether the part in Rust can be built here."""
-    is_whole = (_FOLDER.parents[1] / "clients" / "native" / "Cargo.toml").is_file()
-    is_wanted = os.environ.get("ROHRPOST_PURE", "") in ("", "0")
-    return sys.platform == "linux" and is_whole and is_wanted and shutil.which("cargo") is not None
+    """Whether the part in Rust belongs to what is built here."""
+    return sys.platform == "linux" and os.environ.get("ROHRPOST_PURE", "") in ("", "0")
+
+
+def _require_rust() -> None:
+    """Raises an exception with what is missing to build it."""
+    root = _FOLDER.parent.parent
+    if not (root / "clients" / "native" / "Cargo.toml").is_file():
+        missing = f"{root} is no copy of the repository of Rohrpost, of which it is a part"
+    elif shutil.which("cargo") is None:
+        missing = "there is no `cargo` in PATH; install Rust (https://rustup.rs)"
+    else:
+        return
+    raise RuntimeError(
+        f"the part in Rust of the package `rohrpost` cannot be built: {missing}. Without it a package has no modules "
+        "on the node, `rohrpost.remote` alone: set ROHRPOST_PURE=1 if that is what you want"
+    )
 
 
 def _wheels() -> Any:
     if _has_rust():
+        _require_rust()
         import maturin
 
         # It runs the program of its name, which is not on everybody's path.
@@ -38,7 +53,10 @@ def _wheels() -> Any:
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
     """What has to be installed first."""
-    return [_MATURIN if _has_rust() else _HATCHLING]
+    if not _has_rust():
+        return [_HATCHLING]
+    _require_rust()
+    return [_MATURIN]
 
 
 if _has_rust():

@@ -76,6 +76,22 @@ class Clients(unittest.TestCase):
             self.client.command("probe.0", 16, self.client.describe("probe.0").hash, b"", 20)
         self.assertEqual(fault.exception.fault.number, ARGUMENTS)
 
+    def test_nothing_that_comes_ends_a_client(self) -> None:
+        # A mistake of this package, say, that one package brings out.
+        received, kept = self.host._core.received, threading.Event()
+
+        def fails(now_ns: int, data: bytes) -> None:
+            if not kept.is_set():
+                kept.set()
+                raise ZeroDivisionError("unforeseen")
+            received(now_ns, data)
+
+        with self.assertLogs("rohrpost", "ERROR"):
+            self.host._core.received = fails  # type: ignore[method-assign]
+            wait(kept.is_set)
+            wait(lambda: self.host._core.session.is_up)
+        self.assertEqual(self.call("count", 2), 2)
+
     def test_what_is_lost_or_doubled_on_the_way_runs_once(self) -> None:
         turn = iter(range(10**9))
         # Each package is lost, comes once or comes twice.
@@ -253,6 +269,15 @@ class Clients(unittest.TestCase):
         free.close()
         with self.assertRaisesRegex(rp.NoConnection, f"the TCP router at {address} is not reached"):
             remote.connect(address, "tool.1", INSTALLATION, timeout_s=1)
+        nowhere = "x" * 64 + ".invalid:1"
+        with self.assertRaisesRegex(rp.NoConnection, "is not reached: .*label"):
+            remote.connect(nowhere, "tool.1", INSTALLATION, timeout_s=1)
+        with self.assertRaisesRegex(rp.NoConnection, "is not reached: .*label"):
+            asyncio.run(aio.connect(nowhere, "tool.1", INSTALLATION, timeout_s=1))
+        with remote.connect(address, "tool.1", INSTALLATION, timeout_s=0) as ends:
+            threading.Timer(0.1, ends.close).start()
+            with self.assertRaisesRegex(rp.Misuse, "this client is closed"):
+                ends.wait_until_up(20)
         other = remote.Installation(7, {"tool": 16}, 8, 1)
         with self.assertRaisesRegex(rp.NoConnection, "the common digest here is 0000000000000008"):
             remote.connect(self.server.address, "tool.1", other, timeout_s=1)
@@ -318,6 +343,56 @@ class Clients(unittest.TestCase):
                 await client.status("probe.0")
 
         asyncio.run(main())
+
+    def test_what_leaves_or_cancels_itself_is_a_module_in_error(self) -> None:
+        class Odd:
+            def __repr__(self) -> str:
+                raise KeyError("odd")
+
+        class Leaves(rp.Module, klass="probe"):
+            @rp.command(16)
+            def leave(self) -> None:
+                sys.exit(3)
+
+            @rp.command(17)
+            def odd(self) -> rp.Pose:
+                return Odd()  # type: ignore[return-value]
+
+        class AsyncLeaves(Leaves, klass="probe"):
+            @rp.command(18)
+            async def cancel(self) -> None:
+                task = asyncio.get_running_loop().create_task(asyncio.sleep(20))
+                task.cancel()
+                await task
+
+            @rp.command(19)
+            async def go(self) -> None:
+                sys.exit(4)
+
+            @rp.command(20)
+            async def hang(self) -> None:
+                await asyncio.sleep(60)
+
+        async def hosted_in_a_loop() -> None:
+            async with await aio.connect(self.server.address, "tool.8", INSTALLATION, timeout_s=20) as client:
+                client.host("probe.2", AsyncLeaves())
+                for function, why in {**told, "cancel": "CancelledError", "go": "SystemExit: 4"}.items():
+                    with self.assertRaisesRegex(rp.CallFault, f"the module is in error: {why}"):
+                        await client.call("probe.2", function, timeout_s=20)
+                    for on in (False, True):
+                        await client.switch("probe.2", on, 20)
+                with self.assertRaises(rp.CallTimeout):
+                    await client.call("probe.2", "hang", timeout_s=0.1)
+            # Its own end is no failure, and waits for nobody.
+
+        told = {"leave": "SystemExit: 3", "odd": "RuntimeError: what it returns cannot be told: KeyError"}
+        self.host.host("probe.1", Leaves())
+        for function, why in told.items():
+            with self.assertRaisesRegex(rp.CallFault, f"the module is in error: {why}"):
+                self.client.call("probe.1", function, timeout_s=5)
+            for on in (False, True):
+                self.client.switch("probe.1", on, 20)
+        asyncio.run(hosted_in_a_loop())
 
     def test_both_clients_have_the_same_methods_and_each_has_a_text(self) -> None:
         def public(cls: type) -> dict[str, Any]:

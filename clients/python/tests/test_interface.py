@@ -130,6 +130,45 @@ class Interfaces(unittest.TestCase):
             with self.assertRaisesRegex(rp.Misuse, why):
                 define()
 
+    def test_fields_with_names_that_python_has_its_own_meaning_of_travel_too(self) -> None:
+        @rp.data
+        class Odd:
+            made: Annotated[rp.U8, rp.said(name="__init__")]
+            kind: Annotated[rp.U8, rp.said(name="__class__")]
+            start: Annotated[rp.U8, rp.said(name="from")]
+
+        value = schema.decode(type_of(Odd), b"\1\2\3")
+        self.assertEqual((value, type(value), getattr(value, "from")), (Odd(1, 2, 3), Odd, 3))
+        self.assertEqual(schema.encode(type_of(Odd), value), b"\1\2\3")
+        self.assertEqual(schema.to_json(type_of(Odd), value), {"__init__": 1, "__class__": 2, "from": 3})
+        self.assertEqual(schema.show(type_of(Odd), value), "{__init__: 1, __class__: 2, from: 3}")
+
+    def test_no_function_hides_one_that_each_module_has(self) -> None:
+        def made(key: str, value: Any) -> None:
+            type("Hides", (rp.Module,), {key: value, "__annotations__": {key: int}}, klass="any")
+
+        def one(self: Any) -> int:
+            raise AssertionError("it is never run")
+
+        for key, value in [
+            ("write", rp.command(16)(one)), ("settings", rp.data_out(1)(one)), ("switched_on", rp.every(1.0)(one)),
+            ("proxy", rp.parameter(1)), ("_host", rp.stream(2)(one)),
+        ]:  # fmt: skip
+            with self.assertRaisesRegex(rp.Misuse, f"Hides.{key}: each module has a `{key}` of its own"):
+                made(key, value)
+        made("written", rp.command(16, name="write")(one))
+
+    def test_numbers_that_are_not_finite_are_in_no_range(self) -> None:
+        class Any(rp.Module, klass="any"):
+            speed: float = rp.parameter(0.0)
+            short: rp.F32 = rp.parameter(0.1, min=0.1, max=0.1)
+
+        its = Any()
+        for value in (float("nan"), float("inf")):
+            with self.assertRaisesRegex(rp.Misuse, "Any.speed: .* is not in its range, f64"):
+                its.speed = value
+        its.short = 0.1
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
 import random
+import sys
 import unittest
 from typing import Any
 
+import rohrpost as rp
 from rohrpost import schema
+from rohrpost.annotations import type_of
 from rohrpost.schema import SchemaError, WalkError, decode, encode, type_from_bytes
 from rohrpost.schema.tree import (
     EMPTY_MAX, F32, F64, TEXT, U8, U16, U32, U64, UNIT, Array, Enum, Field, List, Map, Named, Option, Struct, Tuple,
@@ -55,6 +59,33 @@ class Hostile(unittest.TestCase):
             schema.show(type, value)
             schema.to_json(type, value)
             encode(type, value)
+
+    def test_types_of_many_calls_a_level_are_read_as_deep_as_promised_or_refused(self) -> None:
+        made: Type = UNIT
+        for _ in range(126):
+            made = Enum("E", (Named("V", 3, (Field("f", made),)),))
+        data = schema.type_to_bytes(made)
+        self.assertEqual(schema.type_to_bytes(type_from_bytes(data)), data)
+        was = sys.getrecursionlimit()
+        sys.setrecursionlimit(len(inspect.stack(0)) + 200)
+        try:
+            with self.assertRaisesRegex(SchemaError, "deeper than this interpreter's stack"):
+                type_from_bytes(b"\2" + b"\x11" * 120 + b"\0")
+        finally:
+            sys.setrecursionlimit(was)
+
+    def test_what_a_class_refuses_are_wrong_bytes(self) -> None:
+        @rp.data
+        class Percent:
+            value: rp.U8
+
+            def __post_init__(self) -> None:
+                if self.value > 100:
+                    raise ValueError("more than\nall")
+
+        self.assertEqual(decode(type_of(list[Percent]), b"\1\x64"), [Percent(100)])
+        with self.assertRaisesRegex(WalkError, r"^\[1\]: its class does not take it: ValueError: more than\\nall$"):
+            decode(type_of(list[Percent]), b"\2\x64\x65")
 
     def test_values_nest_no_deeper_than_the_limit(self) -> None:
         decode(nested(127), b"")

@@ -2,7 +2,7 @@
 //! `rohrpost.node`, which raise nothing: what went wrong comes back as a text.
 
 use crate::fails::misuse;
-use crate::lent::lend;
+use crate::lent::{lend, require_own_process};
 use crate::values::value;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -24,6 +24,7 @@ pub(crate) fn run(
     settings: Vec<String>,
     bridge: Py<PyAny>,
 ) -> PyResult<u8> {
+    require_own_process(py)?;
     let description = Description::from_bytes(description).map_err(|error| misuse(py, &error.to_string()))?;
     let parameter = |(field, default): (Vec<u8>, Vec<u8>)| {
         let field = Field::from_bytes(&field).map_err(|error| misuse(py, &error.to_string()))?;

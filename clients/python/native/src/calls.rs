@@ -4,7 +4,7 @@ use crate::fails::{call_failure, failure};
 use crate::lent::with;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use rohrpost_native::{CallError, NativeContext, Peer};
+use rohrpost_native::{CallError, Fault, NativeContext, Peer};
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -59,17 +59,35 @@ pub(crate) fn forget(py: Python<'_>, module: &str) -> PyResult<()> {
     })
 }
 
-/// Runs a function of another module; its result in postcard.
+/// A module that still has the interface by which Python has written the arguments: others may have met a newer one
+/// since.
+fn known(
+    py: Python<'_>,
+    context: &mut NativeContext<'_>,
+    module: &str,
+    interface: u32,
+    timeout_s: f64,
+) -> PyResult<Rc<Peer>> {
+    let peer = found(py, context, module, timeout_s)?;
+    if peer.hash == interface {
+        return Ok(peer);
+    }
+    let differs = Fault::InterfaceDiffers { server: peer.hash };
+    Err(call_failure(py, &CallError::Fault(peer.name, differs)))
+}
+
+/// Runs a function of another module, by the hash of its interface; its result in postcard.
 #[pyfunction]
 pub(crate) fn call(
     py: Python<'_>,
     module: &str,
+    interface: u32,
     function: u16,
     arguments: &[u8],
     timeout_s: f64,
 ) -> PyResult<Py<PyBytes>> {
     with(py, |context| {
-        let peer = found(py, context, module, timeout_s)?;
+        let peer = known(py, context, module, interface, timeout_s)?;
         let called = apart(py, context, |context| context.call(&peer, function, arguments, timeout(timeout_s)));
         answer(py, called)
     })
@@ -77,9 +95,9 @@ pub(crate) fn call(
 
 /// Another module's newest data: postcard of the time, then of the value.
 #[pyfunction]
-pub(crate) fn get(py: Python<'_>, module: &str, number: u16, timeout_s: f64) -> PyResult<Py<PyBytes>> {
+pub(crate) fn get(py: Python<'_>, module: &str, interface: u32, number: u16, timeout_s: f64) -> PyResult<Py<PyBytes>> {
     with(py, |context| {
-        let peer = found(py, context, module, timeout_s)?;
+        let peer = known(py, context, module, interface, timeout_s)?;
         let called = apart(py, context, |context| context.get(&peer, number, timeout(timeout_s)));
         answer(py, called)
     })

@@ -1,10 +1,12 @@
 //! The module's context, as functions of Python reach it: lent to the thread for one call of the module's code.
 
 use crate::fails::misuse;
+use crate::owned::drop_left;
 use pyo3::prelude::*;
 use rohrpost_native::NativeContext;
 use std::cell::Cell;
 use std::io::Write;
+use std::path::PathBuf;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -25,21 +27,23 @@ impl Drop for Then {
     }
 }
 
-/// Python tells it of each child process.
+/// Python tells it of each child process. Below which directory the files lie that the child has no part in.
 #[pyfunction]
-pub(crate) fn forked() {
+pub(crate) fn forked() -> PathBuf {
     // ORDERING: Relaxed; it is of one thread.
     IS_FORKED.store(true, Ordering::Relaxed);
+    rohrpost_native::base_directory()
 }
 
 /// Whether this process was forked from one with a module.
-fn is_forked() -> bool {
+pub(crate) fn is_forked() -> bool {
     // ORDERING: Relaxed; as above.
     IS_FORKED.load(Ordering::Relaxed)
 }
 
 /// Lends the context while `part` runs.
 pub(crate) fn lend<T>(context: &mut NativeContext<'_>, part: impl FnOnce() -> T) -> T {
+    drop_left();
     let _then = Then(LENT.take());
     LENT.set(Some(NonNull::from(context).cast()));
     let result = part();
@@ -52,11 +56,17 @@ pub(crate) fn lend<T>(context: &mut NativeContext<'_>, part: impl FnOnce() -> T)
     result
 }
 
+/// For what is its module's alone.
+pub(crate) fn require_own_process(py: Python<'_>) -> PyResult<()> {
+    match is_forked() {
+        true => Err(misuse(py, "this process was forked from a module's, and has no part in it")),
+        false => Ok(()),
+    }
+}
+
 /// Uses the context. What `part` runs cannot use it again.
 pub(crate) fn with<T>(py: Python<'_>, part: impl FnOnce(&mut NativeContext<'_>) -> PyResult<T>) -> PyResult<T> {
-    if is_forked() {
-        return Err(misuse(py, "this process was forked from a module's, and has no part in it"));
-    }
+    require_own_process(py)?;
     let Some(mut lent) = LENT.take() else {
         let why = "this is for a module's own functions, in its own thread, while it runs (`rohrpost.run`)";
         return Err(misuse(py, why));

@@ -12,6 +12,7 @@ mod bridge;
 mod calls;
 mod fails;
 mod lent;
+mod owned;
 mod publishing;
 mod streams;
 mod values;

@@ -1,7 +1,7 @@
 //! What a module gives out, and what it asks its runtime for.
 
 use crate::fails::{failure, misuse};
-use crate::lent::with;
+use crate::lent::{is_forked, with};
 use crate::values::Shared;
 use pyo3::prelude::*;
 use rohrpost_native::{FollowRate, Moment, RecordRoom, SayLevel};
@@ -104,6 +104,11 @@ pub(crate) fn say(py: Python<'_>, level: u8, text: &str) {
         3 => SayLevel::Debug,
         _ => SayLevel::Trace,
     };
+    if is_forked() {
+        // The thread that sends lines is its parent's.
+        eprintln!("{text}");
+        return;
+    }
     // Others may be waiting for the same queue.
     py.detach(|| rohrpost_native::say(level, text));
 }

@@ -180,6 +180,8 @@ def _made_by(cls: Any, own: dict[str, str]) -> Any:
         return cls
     cls.__rohrpost_names__ = {name: known for known, name in renamed.items()}
     for known, name in renamed.items():
+        if known.startswith("__") and known.endswith("__"):
+            continue  # A class of Python has its own meaning of it.
         setattr(cls, known, property(operator.attrgetter(name)))
     return lambda **members: cls(**{own[known]: value for known, value in members.items()})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, ContextManager, Protocol
@@ -13,10 +14,11 @@ from .errors import Misuse
 from .hosts import NodeHost
 from .marks import MARK, Command, DataOut, Every, OnData, OnRecord, StreamOut
 from .schema import tree
+from .schema.decode import decode
 from .schema.description import DataItem, Description, Function
 from .schema.encode import encode
 from .schema.errors import WalkError
-from .schema.text import show
+from .schema.text import describe_type, show
 from .schema.tree import Field, Type
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ class Parameter:
         self._words = words
         self.name = ""
         self.field = Field("", tree.UNIT)
+        self._range: tuple[Any, Any] = (None, None)
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -43,6 +46,7 @@ class Parameter:
         type = type_of(annotation, f"{owner}.{self.name}")
         least, most = (bound_of(type, it, f"{owner}.{self.name}") for it in (self._words.min, self._words.max))
         self.field = Field(self.name.replace("_", "-"), type, self._words.text, self._words.unit, least, most)
+        self._range = (None if least is None else decode(type, least), None if most is None else decode(type, most))
         self.check(self.default, owner)
 
     def check(self, value: Any, owner: str) -> None:
@@ -55,8 +59,13 @@ class Parameter:
             raise Misuse(f"{owner}.{self.name}: {show(self.field.type, value)} is not in its range, {self.range_text}")
 
     def is_in_range(self, value: Any) -> bool:
-        """Whether a value of its type is in its range; what is not a number is in none."""
-        least, most = self._words.min, self._words.max
+        """Whether a value of its type is in its range; what is not a finite number is in none."""
+        least, most = self._range
+        if isinstance(self.field.type, tree.Plain):
+            # As others get it, and its range: an `F32` has fewer digits than a `float`.
+            value = decode(self.field.type, encode(self.field.type, value))
+        if isinstance(value, float) and not math.isfinite(value):
+            return False
         return (least is None or value >= least) and (most is None or value <= most)
 
     @property
@@ -65,6 +74,8 @@ class Parameter:
         least, most = (None if it is None else show(self.field.type, it) for it in (self._words.min, self._words.max))
         if least is not None and most is not None:
             return f"{least}..={most}"
+        if least is None and most is None:
+            return describe_type(self.field.type)
         return f"at least {least}" if most is None else f"at most {most}"
 
     def __get__(self, instance: Any, owner: type) -> Any:
@@ -72,10 +83,11 @@ class Parameter:
 
     def __set__(self, instance: Any, value: Any) -> None:
         self.check(value, type(instance).__name__)
-        instance.__dict__[self.name] = value
         host = instance.__dict__.get("_host")
         if isinstance(host, NodeHost):
             host.parameter_set(instance, self, value)
+        # What others read is not refused by now.
+        instance.__dict__[self.name] = value
 
 
 def parameter(default: Any, *, min: Any = None, max: Any = None, unit: str = "", text: str = "") -> Any:
@@ -237,6 +249,13 @@ def _marks(cls: type) -> list[tuple[str, Any, Any]]:
 
 def _interface(cls: type, klass: str, name: str) -> Interface:
     all_marked = _marks(cls)
+    hides = [key for key, *_ in all_marked] + [key for key, it in vars(cls).items() if isinstance(it, Parameter)]
+    for key in hides:
+        if key in vars(Module):
+            raise Misuse(
+                f"{cls.__name__}.{key}: each module has a `{key}` of its own, which this would hide; take another name "
+                f"(`name=\"{key}\"` in the brackets of a command, data or a stream keeps this one for others)"
+            )
     declared = {key: function for key, _, function in all_marked}
     marked = [(key, mark) for key, mark, _ in all_marked]
     commands = [(key, mark) for key, mark in marked if isinstance(mark, Command)]

@@ -11,7 +11,8 @@
 
 from __future__ import annotations
 
-import importlib.util
+import contextlib
+import importlib
 import os
 import signal
 import sys
@@ -23,10 +24,26 @@ from ..interface import Module
 
 __all__ = ["is_available", "run"]
 
+_runs = False
+
 
 def is_available() -> bool:
-    """Whether this package was built with its part in Rust, so that modules run on the node."""
-    return importlib.util.find_spec("rohrpost._node") is not None
+    """Whether this package has its part in Rust, and that loads, so that modules run on the node."""
+    return _missing() is None
+
+
+def _missing() -> str | None:
+    """Why there are no modules on the node."""
+    try:
+        importlib.import_module("rohrpost._node")
+    except ModuleNotFoundError:
+        return (
+            "this package was installed without its part in Rust, so it has no modules on the node: on Linux, with "
+            "Rust installed, `pip install ./clients/python` builds it; `rohrpost.remote` takes part from anywhere"
+        )
+    except ImportError as error:
+        return f"the part of this package that is Rust does not load, so it has no modules on the node: {error}"
+    return None
 
 
 def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
@@ -35,24 +52,46 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
     Launch tells it by its environment what it is; by hand say ``--config FILE --name CLASS.INSTANCE``, or give it as
     ``arguments``. Raises :class:`rohrpost.Misuse` where it cannot run at all.
     """
-    if not is_available():
-        raise Misuse(
-            "this package was installed without its part in Rust, so it has no modules on the node: on Linux, with "
-            "Rust installed, `pip install ./clients/python` builds it; `rohrpost.remote` takes part from anywhere"
-        )
+    missing = _missing()
+    if missing is not None:
+        raise Misuse(missing)
     if threading.current_thread() is not threading.main_thread():
         raise Misuse("`rohrpost.run` is for the main thread: it takes the signals that end a module")
+    global _runs
+    if _runs:
+        raise Misuse(
+            "a module runs in this process, or in the one that it was forked from; `rohrpost.run` is the last line of "
+            'a program, behind `if __name__ == "__main__":` where worker processes read it, too'
+        )
     from .. import _node
     from .bridge import Bridge
     from .output import listen
 
-    os.register_at_fork(after_in_child=_node.forked)
+    bridge = Bridge(module)
+    _runs = True
+    os.register_at_fork(after_in_child=_forked)
     # Its runtime goes to the safe state at these, and ends then. Python's own would raise in the middle of that.
     for ends in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(ends, signal.SIG_DFL)
     listen()
-    bridge = Bridge(module)
     given = sys.argv[1:] if arguments is None else arguments
     settings = list(module.interface_.settings)
-    code = _node.run(given, module.interface_.description.to_bytes(), bridge.parameters(), settings, bridge)
+    try:
+        code = _node.run(given, module.interface_.description.to_bytes(), bridge.parameters(), settings, bridge)
+    finally:
+        _runs = False
     sys.exit(code)
+
+
+def _forked() -> None:
+    """A child has no part in its parent's module; locks that it kept would tell that the module lives."""
+    from .. import _node
+
+    place = os.path.join(os.path.realpath(_node.forked()), "")
+    nothing = os.open(os.devnull, os.O_RDWR | os.O_CLOEXEC)
+    for number in map(int, os.listdir("/proc/self/fd")):
+        with contextlib.suppress(OSError):  # That of the list itself is closed by now.
+            if os.readlink(f"/proc/self/fd/{number}").startswith(place):
+                # Its number stays taken: nothing else gets it that the parent's objects could meet.
+                os.dup2(nothing, number, inheritable=False)
+    os.close(nothing)

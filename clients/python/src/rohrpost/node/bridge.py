@@ -7,6 +7,7 @@ import json
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .. import _node
@@ -41,13 +42,23 @@ def _told(method: F) -> Callable[..., str | None]:
 
     @functools.wraps(method)
     def run(self: Bridge, *arguments: Any) -> str | None:
+        failed = None
         try:
             method(self, *arguments)
         except BaseException as error:  # Also `sys.exit`: a module ends when launch says so.
-            return self._failed(error)
-        return None
+            failed = self._failed(error)
+        # The exception is gone by now, and with it what its frames held.
+        return self._settled(failed)
 
     return run
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """A record of a stream that is being filled; ``view``: in place."""
+
+    stream: str
+    view: View | None
 
 
 class Bridge(NodeHost):
@@ -69,6 +80,11 @@ class Bridge(NodeHost):
         self._timed = Timed([*self._interface.timed, *self._interface.outputs.values()])
         self._is_configuring = False
         self._watched: dict[int, Callable[[], Any]] = {}
+        self._opened: _Opened | None = None
+        self._kept: dict[str, View] = {}
+        """Of records that were given up, by their streams: into their places somebody may still write."""
+        self._given_up: set[str] = set()
+        """Streams of those that the function which runs has given up."""
 
     def parameters(self) -> list[tuple[bytes, bytes]]:
         """Bytes of the field and of the default of each."""
@@ -123,6 +139,9 @@ class Bridge(NodeHost):
     ) -> None:
         """Data or a record that one of its functions follows."""
         handler = self._followed[follow]
+        its, length = handler.mark, len(data) if isinstance(data, bytes) else data.length
+        if isinstance(its, OnRecord) and length > its.most_bytes:
+            return
         type = self._types.get((handler.name, field)) or self._type(field, handler)
         try:
             held = Held(type, data)
@@ -143,6 +162,11 @@ class Bridge(NodeHost):
 
     def command(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
         """Runs a function: its result; or none, whether the arguments are to blame, and why."""
+        answer = self._answered(number, arguments)
+        left = self._settled(None)
+        return answer if left is None or answer[0] is None else (None, False, left)
+
+    def _answered(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
         function, handler = self._functions[number], self._interface.commands[number]
         try:
             values = decode(self._arguments[number], arguments)
@@ -165,13 +189,16 @@ class Bridge(NodeHost):
         """Parameters have new values; why the module does not want them."""
         module = self._its()
         old = {it.name: getattr(module, it.name) for it in self._interface.parameters}
-        self._configure(values)
+        told = None
         try:
+            self._configure(values)
             module.parameters_set()
         except BaseException as error:  # It is the author's word, whatever its class.
+            told = str(error) or words_of(error)
+        told = self._settled(told)
+        if told is not None:
             module.__dict__.update(old)
-            return str(error) or words_of(error)
-        return None
+        return told
 
     # For the module.
 
@@ -184,27 +211,31 @@ class Bridge(NodeHost):
         _node.publish(item.number, time_ns, self._encoded(item, value))
 
     def write(self, module: Module, stream: str, value: Any, time_ns: int | None) -> None:
-        item = self._item(stream, is_stream=True)
+        item = self._written(stream)
         _node.publish(item.number, time_ns, self._encoded(item, value))
 
     @contextmanager
     def begin(
         self, module: Module, stream: str, value: Any, length: int, time_ns: int | None
     ) -> Iterator[memoryview]:
-        item = self._item(stream, is_stream=True)
+        item = self._written(stream)
         shared = _node.begin(item.number, time_ns, self._encoded(item, value), length)
         own = bytearray(length if shared is None else 0)
         view = None if shared is None else View(shared, is_writable=True)
+        opened = self._opened = _Opened(stream, view)
         try:
             yield memoryview(own) if view is None else view.whole
         except BaseException:
-            _node.abandon()
-            if view is not None:
-                view.release()
+            if self._opened is opened:
+                self._give_up(opened)
             raise
+        if self._opened is not opened:
+            raise Misuse(f"a record of `{stream}` was given up at the end of the function that began it")
         if view is not None and not view.release():
-            _node.abandon()
-            raise kept(f"a record of `{stream}` that is being filled")
+            self._give_up(opened)
+            self._given_up.discard(stream)  # It is told here.
+            raise _kept(stream)
+        self._opened = None
         _node.finish(bytes(own))
 
     def proxy(self, module: Module, name: str) -> NodeProxy:
@@ -241,6 +272,37 @@ class Bridge(NodeHost):
     def _failed(self, error: BaseException) -> str:
         _LOG.debug("in the module's code", exc_info=error)
         return words_of(error)
+
+    def _give_up(self, opened: _Opened) -> None:
+        _node.abandon()
+        self._opened = None
+        if opened.view is not None:
+            self._kept[opened.stream] = opened.view
+            self._given_up.add(opened.stream)
+
+    def _is_free(self, stream: str) -> bool:
+        """Whether nobody can write any more into records of this stream that were given up."""
+        view = self._kept.get(stream)
+        if view is not None and not view.release():
+            return False
+        self._kept.pop(stream, None)
+        return True
+
+    def _settled(self, failed: str | None) -> str | None:
+        """A function has ended: a record that it left unfinished is given up. With what the module is in error."""
+        if self._opened is not None:
+            self._give_up(self._opened)
+        while self._given_up:
+            stream = self._given_up.pop()
+            if not self._is_free(stream):
+                failed = failed or words_of(_kept(stream))
+        return failed
+
+    def _written(self, stream: str) -> DataItem:
+        item = self._item(stream, is_stream=True)
+        if not self._is_free(stream):
+            raise _kept(stream)
+        return item
 
     def _configure(self, values: list[tuple[str, bytes]]) -> None:
         by_name = {it.field.name: it for it in self._interface.parameters}
@@ -280,6 +342,13 @@ class Bridge(NodeHost):
             words = f"{what} is {describe_type(theirs)}, but {wants} {describe_type(ours)}"
             raise Misuse(f"{words}; names of types and units count, too")
         return ours
+
+
+def _kept(stream: str) -> Misuse:
+    return Misuse(
+        f"a view of a record of `{stream}` that is being filled is kept, so `{stream}` takes no record until it is let "
+        "go; copy what you keep: `bytes(…)`, `numpy.array(…)`"
+    )
 
 
 def _followed(handler: Handler) -> str:

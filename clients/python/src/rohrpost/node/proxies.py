@@ -33,7 +33,10 @@ class NodeProxy:
             def its(to: Name, described: Description) -> Prepared:
                 return prepare(described, function_of(to, described, function), values, named)
 
-            return self._asked(its, lambda it: _node.call(self._module, it.number, it.arguments, self._timeout_s))
+            def send(it: Prepared) -> bytes:
+                return _node.call(self._module, it.interface, it.number, it.arguments, self._timeout_s)
+
+            return self._asked(its, send)
 
         return call
 
@@ -42,7 +45,7 @@ class NodeProxy:
 
         def send(it: Prepared) -> bytes:
             number, _ = decode_front(U16, it.arguments)
-            return _node.get(self._module, number, self._timeout_s)
+            return _node.get(self._module, it.interface, number, self._timeout_s)
 
         found: tuple[int, Any] = self._asked(lambda to, described: prepare_get(to, described, data), send)
         return found
@@ -55,7 +58,7 @@ class NodeProxy:
             except CallFault as error:
                 if error.fault.number != INTERFACE_DIFFERS or is_last:
                     raise
-                # It is another by now, and was not run.
+                # It is another by now, as it says itself or as another proxy has met it, and nothing was run.
                 self._known = None
                 _node.forget(self._module)
                 continue

@@ -5,13 +5,15 @@
     Shared (Rust: keeps the memory mapped) ◀── an array of ctypes ◀── memoryview ◀── what an author makes of it
 
 What an author keeps of it keeps the array, and that the memory: no view ever leads nowhere. But its bytes are those of
-another record by then, so it is told.
+another record by then, so it is told. A record that is filled while its view is kept is never one for others, and its
+stream takes no other until the view is let go.
 """
 
 from __future__ import annotations
 
 import ctypes
 import functools
+import gc
 import weakref
 from typing import TYPE_CHECKING, Any
 
@@ -52,14 +54,21 @@ class View:
         return part
 
     def release(self) -> bool:
-        """They are lent no more; whether nothing of them was kept."""
+        """They are lent no more; whether nothing of them was kept. Asked again, whether that holds still."""
+        if self._is_free():
+            return True
+        # What nobody reaches any more may wait for it, such as an exception in a local of the frame that caught it.
+        gc.collect()
+        return self._is_free()
+
+    def _is_free(self) -> bool:
         for view in reversed(self._lent):
             try:
                 view.release()
             except BufferError:  # An array of numpy is made of it, say.
                 return False
         self._lent.clear()
-        del self.whole
+        self.__dict__.pop("whole", None)
         return self._array() is None
 
 

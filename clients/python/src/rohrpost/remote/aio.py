@@ -11,6 +11,7 @@ Functions of hosted modules may be coroutines; others run in the loop and hold i
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import socket
 import ssl
@@ -30,7 +31,7 @@ from .aio_handles import AsyncProxy, AsyncRecordStream, AsyncSubscription, Modul
 from .calls import Call
 from .client import Client
 from .clock import passed_ns
-from .core import Endpoint, not_connected
+from .core import Endpoint, broken, not_connected
 from .session import Settings, Step
 from .shell import Shell, documented_like
 from .streams import Wanted
@@ -104,6 +105,7 @@ class AsyncClient(Shell):
             await asyncio.wait_for(self._until(lambda: self._core.session.is_up), timeout_s)
         except asyncio.TimeoutError:
             raise not_connected(self._core) from None
+        self._check()
 
     async def _until(self, is_so: Callable[[], Any]) -> None:
         while not is_so() and not self._is_closed:
@@ -273,7 +275,7 @@ class AsyncClient(Shell):
     async def _connect(self) -> None:
         try:
             _, line = await asyncio.wait_for(self._loop.create_connection(lambda: _Line(self), *self._server), 5.0)
-        except (OSError, asyncio.TimeoutError) as error:
+        except (OSError, UnicodeError, asyncio.TimeoutError) as error:
             host, port = self._server
             why = f"the TCP router at {host}:{port} is not reached: {error}"
             self._core.session.closed(passed_ns(), why)
@@ -302,7 +304,8 @@ class _Line(asyncio.Protocol):
         assert isinstance(transport, asyncio.Transport)
         self._stream = transport
         transport.set_write_buffer_limits(high=16_384)
-        transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        with contextlib.suppress(OSError):  # It is gone already, as is told soon.
+            transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._flush()
 
     def pause_writing(self) -> None:
@@ -337,7 +340,11 @@ class _Line(asyncio.Protocol):
             return self._client._broken(self, str(error))
         self._flush()
         if self._client._line is self:
-            self._client._core.received(passed_ns(), plain)
+            try:
+                self._client._core.received(passed_ns(), plain)
+            except Exception as error:  # Nothing that comes may end what is hosted here.
+                self.drop()
+                return self._client._broken(self, broken(error))
             self._client._soon()
 
     def connection_lost(self, error: Exception | None) -> None:

@@ -159,6 +159,7 @@ class ModuleHost:
     def __init__(self, client: AsyncClient, name: Name, module: Module) -> None:
         self._client = client
         self._has_work = asyncio.Event()
+        self._is_ended = False
         core = client._core
         core.now_ns = passed_ns()
         self._endpoint = core.host(core.now_ns, name, module, self._has_work.set)
@@ -178,13 +179,38 @@ class ModuleHost:
             try:
                 result = work.run()
                 if inspect.isawaitable(result):
-                    result = await result
-            except Exception as error:  # The author's code may raise anything; the module is in error then.
-                failed = error
+                    result, failed = await self._awaited(result)
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
+                if self._is_ended:
+                    raise
+                failed = error  # The author's code may raise anything, also `SystemExit`; the module is in error then.
             work.finish(passed_ns(), result, failed)
             self._client._soon()
             # Others get their turn, however much there is to do.
             await asyncio.sleep(0)
+
+    async def _awaited(self, its: Awaitable[Any]) -> tuple[Any, BaseException | None]:
+        """The outcome of the author's coroutine. It has a task of its own, to tell what is cancelled in there from the
+        end of this one."""
+
+        async def run() -> tuple[Any, BaseException | None]:
+            try:
+                return await its, None
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
+                return None, error
+
+        task = self._client._loop.create_task(run())
+        try:
+            await asyncio.wait({task})
+        except asyncio.CancelledError:
+            self._is_ended = True
+            task.cancel()
+            raise
+        return task.result()
 
     def publish(self, module: Module, data: str, value: Any, time_ns: int | None) -> None:
         self._client._check()

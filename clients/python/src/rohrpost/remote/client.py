@@ -24,7 +24,7 @@ from .. import wire
 from . import calling
 from .calls import Call
 from .clock import passed_ns
-from .core import Endpoint, not_connected
+from .core import Endpoint, broken, not_connected
 from .handles import ModuleHost, Proxy, RecordStream, Subscription
 from .line import Ears, Line, Waiting
 from .session import Settings, Step
@@ -78,7 +78,9 @@ class Client(Shell):
     def wait_until_up(self, timeout_s: float) -> None:
         """Waits until it takes part. Raises :class:`NoConnection` with what is in the way."""
         with self._locked():
-            if not self._lock.wait_for(lambda: self._core.session.is_up or self._is_closed, timeout_s):
+            self._lock.wait_for(lambda: self._core.session.is_up or self._is_closed, timeout_s)
+            if not self._core.session.is_up:
+                self._check()
                 raise not_connected(self._core)
 
     def _locked(self) -> _Locked:
@@ -339,13 +341,13 @@ class Client(Shell):
         why = ""
         try:
             stream = socket.create_connection(self._server, timeout=_CONNECT_S)
-        except OSError as error:
+            stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except (OSError, UnicodeError) as error:  # Also a name that is none: of a part of 64 letters, say.
             host, port = self._server
             why = f"the TCP router at {host}:{port} is not reached: {error}"
         with self._lock:
             if why:
                 return self._core.session.closed(passed_ns(), why)
-            stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             stream.setblocking(False)
             self._core.session.connected(passed_ns())
             self._ears.line = Line(stream, Plain() if self._context is None else Sealed(self._context))
@@ -365,8 +367,8 @@ class Client(Shell):
                 with self._lock:
                     if line is not None:
                         self._read(line)
-        except (OSError, NoConnection) as error:
-            why = str(error) if isinstance(error, NoConnection) else f"the connection broke: {error}"
+        except Exception as error:  # Nothing that comes may end this thread, and with it all that is hosted here.
+            why = broken(error)
             with self._lock:
                 self._core.session.closed(passed_ns(), why)
                 self._ears.drop()

@@ -7,6 +7,7 @@ modules, and holds one lock (or one thread) around all of it.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,7 @@ from ..faults import Fault
 from ..interface import Handler, Module
 from ..names import COMMANDS, DATA, REPLIES, Name
 from ..schema.description import Description
+from ..schema.errors import plain
 from ..schema.tree import Type
 from ..wire import ERROR, UNKNOWN_NS, CallEnvelope, Package, ReplyEnvelope, WireError, package
 from .calls import Caller, incarnation
@@ -28,6 +30,7 @@ from .timing import SystemTime
 from .work import WorkQueue
 
 _HOSTED_MAX = 64
+_LOG = logging.getLogger(__name__)
 
 
 class Endpoint:
@@ -259,3 +262,13 @@ class Core:
 def not_connected(core: Core) -> NoConnection:
     """Why it does not take part."""
     return NoConnection(core.words)
+
+
+def broken(error: Exception) -> str:
+    """Why a connection ends."""
+    if isinstance(error, NoConnection):
+        return str(error)
+    if isinstance(error, OSError):
+        return f"the connection broke: {error}"
+    _LOG.error("what the TCP router sent cannot be taken", exc_info=error)
+    return plain(f"what came cannot be taken: {type(error).__name__}: {error}")[:900]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..common import DescriptionPart, Subscribe, Unsubscribe, type_of_class
-from ..errors import BadReply, CallError, CallFault, RohrpostError
+from ..errors import BadReply, CallError, CallFault, CallTimeout, RohrpostError
 from ..faults import INTERFACE_DIFFERS
 from ..names import DATA, Name
 from ..schema.binary import type_to_bytes
 from ..schema.decode import decode
 from ..schema.description import DataItem, Description
 from ..schema.encode import encode
-from ..schema.errors import SchemaError, WalkError
+from ..schema.errors import SchemaError, WalkError, plain
 from ..schema.text import describe_type
 from ..schema.tree import U32, Type
 from ..wire import (
@@ -25,6 +25,8 @@ from .calls import Call, Caller
 LEASE_MS = 3000
 _RENEW_NS = 1_000_000_000
 _PATIENCE_NS = 1_000_000_000
+DESCRIBED_NS = 10 * _PATIENCE_NS
+"""A description comes in this time, however slow the way is and many parts it has."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def item_of(to: Name, described: Description, name: str, expected: Type | None, 
     having = [it for it in described.data if what == "data" or it.is_stream]
     item = next((it for it in having if it.name == name), None)
     if item is None:
-        names = ", ".join(it.name for it in having) or "none"
+        names = ", ".join(plain(it.name) for it in having) or "none"
         raise NoSuchData(f"{to}: no {what} `{name}`; it has: {names}")
     if expected and type_to_bytes(expected, True) != type_to_bytes(item.field.type, True):
         raise NoSuchData(
@@ -58,7 +60,8 @@ def item_of(to: Name, described: Description, name: str, expected: Type | None, 
 
 
 class Describing:
-    """Asks a module what it offers, part by part; ``done`` gets it, or what went wrong. ``now`` tells the time, ns."""
+    """Asks a module what it offers, part by part, all of them in this time, each in ``each_ns``; ``done`` gets it, or
+    what went wrong. ``now`` tells the time, ns."""
 
     def __init__(
         self,
@@ -67,18 +70,21 @@ class Describing:
         to: Name,
         timeout_ns: int,
         done: Callable[[Description | CallError], None],
+        each_ns: int | None = None,
     ) -> None:
         self._caller, self._now, self._to, self._done = caller, now, to, done
-        self._timeout_ns = timeout_ns
+        self._timeout_ns, self._until_ns = timeout_ns, now() + timeout_ns
+        self._each_ns = timeout_ns if each_ns is None else each_ns
         self._bytes = b""
         self._ask()
 
     def _ask(self) -> None:
-        arguments = encode(U32, len(self._bytes))
+        arguments, now_ns = encode(U32, len(self._bytes)), self._now()
+        left_ns = min(self._until_ns - now_ns, self._each_ns)
+        if self._bytes and left_ns <= 0:
+            return self._done(CallTimeout(self._to, self._timeout_ns / 1e9))
         try:
-            self._caller.begin(
-                self._now(), self._to, DESCRIBE, COMMON_HASH, arguments, self._timeout_ns, self._answered
-            )
+            self._caller.begin(now_ns, self._to, DESCRIBE, COMMON_HASH, arguments, left_ns, self._answered)
         except CallError as error:
             self._done(error)
 
@@ -91,9 +97,14 @@ class Describing:
             if len(self._bytes) < part.total:
                 return self._ask()
             description = Description.from_bytes(self._bytes)
+            _ = description.hash  # Whatever is wrong with it shows here.
+        except CallTimeout as error:
+            # However much of all the time the last part had.
+            is_over = self._now() >= self._until_ns
+            return self._done(CallTimeout(self._to, self._timeout_ns / 1e9) if is_over else error)
         except CallError as error:
             return self._done(error)
-        except (WalkError, SchemaError) as error:
+        except (WalkError, SchemaError, RecursionError) as error:
             return self._done(BadReply(self._to, str(error)))
         self._done(description)
 
@@ -138,7 +149,7 @@ class Following:
         if now_ns >= self._next_ns and not self._is_asking:
             self._is_asking, self._next_ns = True, now_ns + _RENEW_NS
             if self._description is None:
-                Describing(self._caller, self._now, self.to, _PATIENCE_NS, self._described)
+                Describing(self._caller, self._now, self.to, DESCRIBED_NS, self._described, _PATIENCE_NS)
             else:
                 self._subscribe(self._description)
         return self._next_ns
@@ -167,7 +178,8 @@ class Following:
     def _subscribed(self, call: Call) -> None:
         if call.error is not None:
             if isinstance(call.error, CallFault) and call.error.fault.number == INTERFACE_DIFFERS:
-                self._description, self._next_ns = None, 0
+                # Asked anew when its time comes: one that always says so is not asked without a pause.
+                self._description = None
             return self._failed(call.error)
         self._is_asking = False
         self._state(None)

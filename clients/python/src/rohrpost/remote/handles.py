@@ -185,7 +185,7 @@ class ModuleHost:
             result, failed = None, None
             try:
                 result = work.run()
-            except Exception as error:  # The author's code may raise anything; the module is in error then.
+            except BaseException as error:  # The author's code may raise anything, also `SystemExit`: it is in error.
                 failed = error
             with self._client._lock:
                 work.finish(passed_ns(), result, failed)

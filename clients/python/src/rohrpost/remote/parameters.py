@@ -59,9 +59,9 @@ class Parameters:
         ]
         if not wish.only_check and new:
             old = {parameter.name: getattr(self._module, parameter.name) for parameter, _ in new.values()}
-            for parameter, value in new.values():
-                setattr(self._module, parameter.name, value)
             try:
+                for parameter, value in new.values():
+                    setattr(self._module, parameter.name, value)
                 self._module.parameters_set()
             except Exception as error:  # It is the author's word, whatever its class.
                 for name, value in old.items():

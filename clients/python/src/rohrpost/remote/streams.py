@@ -23,10 +23,10 @@ from ..schema import tree
 from ..schema.decode import decode
 from ..schema.description import Description
 from ..schema.encode import encode
-from ..schema.errors import WalkError
+from ..schema.errors import WalkError, plain
 from ..schema.tree import Tuple, Type
 from .calls import Call, Caller
-from .following import Describing, NoSuchData, item_of
+from .following import DESCRIBED_NS, Describing, NoSuchData, item_of
 from .frames import DescribedPart, RecordPart, Registered
 from .records import Assembly, Record
 
@@ -174,7 +174,7 @@ class Streams:
             wanted.assembly.record_bytes = min(found[0].record_bytes, wanted.most_bytes)
             return
         name = f"{self._installation.text(wanted.publisher)}/{wanted.stream}"
-        given = ", ".join(f"{self._installation.text(Name(it.source))}/{it.item}" for it in having) or "none"
+        given = ", ".join(f"{self._installation.text(Name(it.source))}/{plain(it.item)}" for it in having) or "none"
         wanted.say(
             NoSuchStream(
                 f"the robot sends node {self._node} no stream {name}; its file needs a [[replica]] with "
@@ -244,7 +244,7 @@ class _Asking:
         done: Callable[[BeyondStreams | RohrpostError], None],
     ) -> None:
         self._caller, self._now, self._router, self._done = caller, now, router, done
-        Describing(caller, now, router, _PATIENCE_NS, self._described)
+        Describing(caller, now, router, DESCRIBED_NS, self._described, _PATIENCE_NS)
 
     def _described(self, described: Description | CallError) -> None:
         if isinstance(described, CallError):

@@ -14,7 +14,14 @@ class Work:
 
     def __init__(self, run: Callable[[], Any], finish: Finish) -> None:
         self.run = run
-        self.finish = finish
+        self._finish = finish
+
+    def finish(self, now_ns: int, result: Any, error: BaseException | None) -> None:
+        """It was run. What the author's result or exception cannot do is the module's failure like any other."""
+        try:
+            self._finish(now_ns, result, error)
+        except Exception as wrong:
+            self._finish(now_ns, None, RuntimeError(f"what it returns cannot be told: {type(wrong).__name__}"))
 
 
 class WorkQueue:

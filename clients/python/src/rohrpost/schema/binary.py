@@ -177,7 +177,10 @@ class Reader:
                 f"descriptions of version {version}, this program knows {VERSION}; use programs of the same version "
                 "of Rohrpost"
             )
-        whole = read(reader)
+        try:
+            whole = read(reader)
+        except RecursionError:
+            raise SchemaError("types nested deeper than this interpreter's stack has room for") from None
         left = len(data) - reader._at
         if left:
             raise SchemaError(f"{left} bytes behind the end of the description")
@@ -227,7 +230,10 @@ class Reader:
 
     def many(self, read: Callable[[Reader], T]) -> tuple[T, ...]:
         """How many, and each. Memory grows with the bytes that are there, as each takes one at least."""
-        return tuple(read(self) for _ in range(self.number(32)))
+        found = []  # A generator would take one more call of Python for each level of nested types.
+        for _ in range(self.number(32)):
+            found.append(read(self))
+        return tuple(found)
 
     def _one_more(self) -> None:
         self._types_left -= 1

@@ -17,8 +17,8 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from .errors import WalkError, counted
-from .readers import READERS, UNREAD, Lend, Reader
+from .errors import WalkError, counted, plain
+from .readers import READERS, Lend, Reader
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
@@ -36,7 +36,7 @@ def decode(type: Type, data: bytes | memoryview, lend: Lend = None) -> Any:
             value, end = read(data, 0, lend)
             if end == len(data):
                 return value
-        except UNREAD:
+        except Exception:  # Also what an author's class raises.
             pass  # What is wrong, and where, is found below.
     decoder = Decoder(data, lend)
     value = decoder.value(type)
@@ -52,6 +52,15 @@ def decode_front(type: Type, data: bytes) -> tuple[Any, int]:
     decoder = Decoder(data)
     value = decoder.value(type)
     return value, len(data) - decoder.at
+
+
+def made(python: Any, *values: Any, **named: Any) -> Any:
+    """A value of an author's class, which may refuse what came: then the bytes are wrong, not this program."""
+    try:
+        return python(*values, **named)
+    except Exception as error:
+        words = plain(f"{type(error).__name__}: {error}")[:200]
+        raise WalkError(f"its class does not take it: {words}") from error
 
 
 class Decoder:
@@ -144,7 +153,7 @@ class Decoder:
 
     def struct(self, type: Struct) -> Any:
         members = self.members(type.named)
-        return members if type.python is None else type.python(**(members or {}))
+        return members if type.python is None else made(type.python, **(members or {}))
 
     def map(self, type: Map) -> Any:
         length = self.length(False)
@@ -165,7 +174,7 @@ class Decoder:
             payload = self.members(variant)
         except WalkError as error:
             raise error.within(variant.name) from None
-        return Variant(variant.name, payload) if type.python is None else type.python(variant.name, payload)
+        return Variant(variant.name, payload) if type.python is None else made(type.python, variant.name, payload)
 
     def length(self, is_of_empty: bool) -> int:
         claimed, left = self.varint(64), len(self.data) - self.at

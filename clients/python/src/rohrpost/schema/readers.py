@@ -33,10 +33,6 @@ class Unread(Exception):
     """These bytes are for :class:`.decode.Decoder`."""
 
 
-UNREAD = (Unread, IndexError, struct.error, UnicodeDecodeError)
-"""What a reader raises of bytes that do not fit."""
-
-
 def reader_of(type: Type) -> Reader | None:
     """Makes a reader of a type; none: it nests too deep, or may have too many values that take no bytes."""
     try:

@@ -220,7 +220,7 @@ def _members_to_json(named: Named, value: Any, of_bytes: Callable[[bytes], Any])
     if named.kind == 2:
         return [to_json(field.type, element, of_bytes) for field, element in zip(named.fields, value)]
     if dataclasses.is_dataclass(value):
-        return {field.name: to_json(field.type, getattr(value, field.name), of_bytes) for field in named.fields}
+        return {field.name: to_json(field.type, _member(value, field.name), of_bytes) for field in named.fields}
     return {field.name: to_json(field.type, value[field.name], of_bytes) for field in named.fields}
 
 
@@ -263,6 +263,12 @@ def show(type: Type, value: Any, limit: int = LIST_SHOWN) -> str:
     return _chosen(variant.name, _show_members(variant, value.value, limit))
 
 
+def _member(value: Any, known: str) -> Any:
+    """A field of a dataclass by the name that others know it by."""
+    renamed = getattr(value, "__rohrpost_names__", {})
+    return getattr(value, next((own for own, its in renamed.items() if its == known), known))
+
+
 def _show_members(named: Named, value: Any, limit: int) -> str:
     if named.kind == 0:
         return "null"
@@ -270,7 +276,7 @@ def _show_members(named: Named, value: Any, limit: int) -> str:
         return show(named.fields[0].type, value, limit)
     if named.kind == 2:
         return _list([show(f.type, v, limit) for f, v in zip(named.fields[:limit], value)], len(value), limit)
-    at = (lambda name: getattr(value, name)) if dataclasses.is_dataclass(value) else value.__getitem__
+    at = (lambda name: _member(value, name)) if dataclasses.is_dataclass(value) else value.__getitem__
     return "{" + ", ".join(f"{_bare(f.name)}: {show(f.type, at(f.name), limit)}" for f in named.fields) + "}"
 
 
