@@ -597,9 +597,9 @@ typedef struct rohrpost_module {
   // Once a period while it is on. If it fails, the module is switched off and in error; so it is with those below.
   rohrpost_outcome (*tick)(void *user);
   // Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED`, when `arguments` cannot be read
-  // or are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the function
-  // or the interface does not have it, that there is no such function; the module goes on then. What a function's
-  // own result says is no failure of it.
+  // or are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the
+  // function or the interface does not have it, that there is no such function; the module goes on then. What a
+  // function's own result says is no failure of it.
   rohrpost_outcome (*command)(void *user,
                               uint16_t number,
                               struct rohrpost_decoder *arguments,

@@ -54,9 +54,9 @@ pub struct ModuleTable {
     /// Once a period while it is on. If it fails, the module is switched off and in error; so it is with those below.
     pub tick: Option<unsafe extern "C" fn(user: *mut c_void) -> Outcome>,
     /// Runs a function: reads its arguments, writes its result. `ROHRPOST_MALFORMED`, when `arguments` cannot be read
-    /// or are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the function
-    /// or the interface does not have it, that there is no such function; the module goes on then. What a function's
-    /// own result says is no failure of it.
+    /// or are not read to their end, tells the caller so, and `ROHRPOST_NO_ITEM`, when no call has failed in the
+    /// function or the interface does not have it, that there is no such function; the module goes on then. What a
+    /// function's own result says is no failure of it.
     pub command: Option<
         unsafe extern "C" fn(user: *mut c_void, number: u16, arguments: *mut Decoder, reply: *mut Encoder) -> Outcome,
     >,

@@ -73,6 +73,16 @@ int main(int count, char **arguments) {
         GIVES(ROHRPOST_NOTHING, rohrpost_wait(node, sources, 2, 1));
     }
     CHECK(taken == before);
+    // However often a place is used again, an old handle leads to nobody else's sender.
+    const rohrpost_sender old = sender;
+    DONE(rohrpost_sender_close(sender));
+    for (int round = 0; round < 65535; round++) {
+        DONE(rohrpost_sender_open(node, own, &sender));
+        DONE(rohrpost_sender_close(sender));
+    }
+    DONE(rohrpost_sender_open(node, own, &sender));
+    CHECK(sender.id != old.id);
+    GIVES(ROHRPOST_CLOSED, rohrpost_send(old, &label, "x", 1));
     puts("all is well");
     return 0;
 }
