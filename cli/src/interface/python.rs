@@ -21,8 +21,8 @@ const BUILT_IN: &str = " Annotated bool bytes dict enum float int list rp str tu
 /// Standard types that the package has.
 const STANDARD: [&str; 6] = ["Image", "ImageFormat", "LaserScan", "Odometry", "Pose", "Twist"];
 /// What each module and each member of an enum has already.
-pub(super) const OF_MODULES: &str = " begin interface_ now_ns parameters_set proxy publish settings stream switched_off \
-    switched_on unwatch watch write ";
+pub(super) const OF_MODULES: &str = " begin interface_ now_ns parameters_set proxy publish settings stream \
+    switched_off switched_on unwatch watch write ";
 const OF_ENUMS: &str = " mro name value ";
 
 /// The whole file.

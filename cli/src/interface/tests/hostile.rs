@@ -132,9 +132,9 @@ fn thousands_of_one_name_have_numbers() {
 /// Ends comments, literals and lines of each language, and goes on with what none compiles.
 const TEXT: &str = "*/ \"\"\" ??/\n#error FORGED\n'''\\\" compile_error!(\"FORGED\"); raise FORGED \u{202e}\u{2028}\\\
     \r\n#error FORGED \\ ```\n\
-    compile_error!(\"FORGED_behind_a_fence_in_a_word_that_is_so_long_that_it_has_a_line_of_its_own_in_every_language\")\n\
+    compile_error!(\"FORGED_behind_a_fence_in_a_word_that_is_so_long_that_it_has_a_line_of_its_own_in_all_of_them\")\n\
     ~~~ <script>FORGED</script> \
-    the_next_is_behind_a_word_that_is_so_long_that_it_has_a_line_of_its_own_in_every_language_and_more >>> FORGED()";
+    the_next_is_behind_a_word_that_is_so_long_that_it_has_a_line_of_its_own_in_all_of_them_and_more >>> FORGED()";
 /// The same without what no name may have.
 const NAME: &str = "*/ \"\"\" ??/ FORGED'''\\\" compile_error!(FORGED); raise FORGED */ \\";
 
