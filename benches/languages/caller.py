@@ -28,6 +28,7 @@ class Caller(rp.Module, klass="caller"):
                     raise
         drive, watch, goes_on = motor.drive, Stopwatch(turn), True
         while goes_on:
+            turn.pause()
             sent_ns = time.monotonic_ns()
             drive(0.5, 0.25)
             goes_on = watch.took(sent_ns, time.monotonic_ns())

@@ -1,7 +1,7 @@
 // Ping-pong by mailboxes in C, as `benches/src/harness/ping_pong.rs` plays it in Rust: the same messages and checks.
 //
-// Arguments: ping or pong, bytes, messages, warm-up, cap (ms), file for samples; directory of the node, blocking or
-// spinning.
+// Arguments: ping or pong, bytes, messages, warm-up, pause before each (ns), cap (ms), file for samples; directory of
+// the node, blocking or spinning.
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -86,7 +86,16 @@ static void send_message(const uint8_t *message) {
     done(rohrpost_send(sender, &label, message, bytes), "send");
 }
 
-static void ping(uint64_t messages, uint64_t warm_up, uint64_t cap_ns, const char *samples) {
+// The far end has gone to sleep by then.
+static void pause_for(uint64_t ns) {
+    for (uint64_t began = now_ns(); ns > 0 && now_ns() - began < ns;) {
+    }
+}
+
+static void ping(char **arguments) {
+    uint64_t messages = strtoull(arguments[3], NULL, 10), warm_up = strtoull(arguments[4], NULL, 10);
+    uint64_t pause_ns = strtoull(arguments[5], NULL, 10), cap_ns = strtoull(arguments[6], NULL, 10) * 1000000;
+    const char *samples = arguments[7];
     static uint8_t message[BYTES_MAX], echo[BYTES_MAX];
     uint64_t *round_trips = calloc(messages, sizeof *round_trips);
     FILE *file = fopen(samples, "wb");
@@ -100,6 +109,7 @@ static void ping(uint64_t messages, uint64_t warm_up, uint64_t cap_ns, const cha
     bool is_warm = warm_up == 0;
     for (uint64_t number = 0; number < warm_up + messages; number++) {
         fill(message, number);
+        pause_for(pause_ns);
         uint64_t sent = now_ns();
         send_message(message);
         receive(echo);
@@ -148,19 +158,19 @@ static void pong(void) {
 }
 
 int main(int count, char **arguments) {
-    if (count != 9) {
-        fprintf(stderr, "eight arguments, not %d\n", count - 1);
+    if (count != 10) {
+        fprintf(stderr, "nine arguments, not %d\n", count - 1);
         return 1;
     }
     bool is_ping = strcmp(arguments[1], "ping") == 0;
     bytes = strtoull(arguments[2], NULL, 10);
-    spins = strcmp(arguments[8], "spinning") == 0;
+    spins = strcmp(arguments[9], "spinning") == 0;
     if (bytes < 16 || bytes > BYTES_MAX) {
         fail("bytes", bytes, BYTES_MAX);
     }
     uint32_t mine = is_ping ? NAME_PING : NAME_PONG, other = is_ping ? NAME_PONG : NAME_PING;
     rohrpost_node node;
-    done(rohrpost_node_open_directory(arguments[7], true, mine, &node), "node");
+    done(rohrpost_node_open_directory(arguments[8], true, mine, &node), "node");
     rohrpost_mailbox_shape shape = ROHRPOST_MAILBOX_DEFAULT;
     shape.body_bytes_max = (uint16_t)bytes;
     done(rohrpost_receiver_open(node, mine, &shape, &receiver), "mailbox");
@@ -169,8 +179,7 @@ int main(int count, char **arguments) {
     label.from = mine;
     meet();
     if (is_ping) {
-        uint64_t cap_ns = strtoull(arguments[5], NULL, 10) * 1000000;
-        ping(strtoull(arguments[3], NULL, 10), strtoull(arguments[4], NULL, 10), cap_ns, arguments[6]);
+        ping(arguments);
     } else {
         pong();
     }

@@ -1,6 +1,7 @@
 """Ping-pong, for all contenders in Python alike: the messages, what is measured of them, and what is checked.
 
-Arguments of each program: ``ping`` or ``pong``, bytes, messages, warm-up, cap (ms), file for samples, and its own.
+Arguments of each program: ``ping`` or ``pong``, bytes, messages, warm-up, pause before each (ns), cap (ms), file for
+samples, and its own.
 """
 
 import array
@@ -21,9 +22,9 @@ class Turn:
     """What the bench asks for."""
 
     def __init__(self):
-        self.end, count, messages, warm_up, cap_ms, self.samples, *self.own = sys.argv[1:]
+        self.end, count, messages, warm_up, pause_ns, cap_ms, self.samples, *self.own = sys.argv[1:]
         self.bytes, self.messages, self.warm_up = int(count), int(messages), int(warm_up)
-        self.cap_ns = int(cap_ms) * 1_000_000
+        self.pause_ns, self.cap_ns = int(pause_ns), int(cap_ms) * 1_000_000
         self.is_ping = self.end == "ping"
 
     def meet(self):
@@ -31,6 +32,12 @@ class Turn:
         print("ready", flush=True)
         if not sys.stdin.readline():
             raise EOFError("the bench has gone")
+
+    def pause(self):
+        """Before a message: the far end has gone to sleep by then."""
+        until_ns = time.monotonic_ns() + self.pause_ns
+        while time.monotonic_ns() < until_ns:
+            pass
 
 
 class Stopwatch:
@@ -92,6 +99,7 @@ class Ping:
         # The far end waits for it by then.
         time.sleep(0.01)
         self._message = message_of(0, self._turn.bytes)
+        self._turn.pause()
         self._sent_ns = time.monotonic_ns()
         return self._message
 
@@ -104,6 +112,7 @@ class Ping:
         self._number += 1
         self._message = message_of(self._number if goes_on else STOP, self._turn.bytes)
         self.is_done = not goes_on
+        self._turn.pause()
         self._sent_ns = time.monotonic_ns()
         return self._message
 

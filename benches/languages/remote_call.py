@@ -27,6 +27,7 @@ with remote.connect(server, "tool.64", installation, label="bench", timeout_s=20
     watch = Stopwatch(turn)
     goes_on = True
     while goes_on:
+        turn.pause()
         sent_ns = time.monotonic_ns()
         drive(0.5, 0.25)
         goes_on = watch.took(sent_ns, time.monotonic_ns())

@@ -2,7 +2,7 @@
 //! Python is `benches/languages/player.py`. It is this program again, with the arguments of a
 //! [`crate::harness::ForeignProgram`].
 
-use crate::harness::{Cell, Failure, ForeignProgram, Placement, SAMPLES_MIN, Scheduling, check_echo, fill};
+use crate::harness::{Cell, Failure, ForeignProgram, Pause, Placement, SAMPLES_MIN, Scheduling, check_echo, fill};
 use crate::motor::NoSettings;
 use nix::sys::signal::{Signal, raise};
 use rohrpost_mailbox::monotonic_ns;
@@ -46,8 +46,8 @@ pub(crate) fn run_hidden_module() -> Option<Result<(), Failure>> {
 }
 
 fn run(arguments: &[String]) -> Result<(), Failure> {
-    let [end, bytes, messages, warm_up, cap_ms, samples, config] = arguments else {
-        return Err(Failure::Failed(format!("seven arguments, not {}", arguments.len())));
+    let [end, bytes, messages, warm_up, pause_ns, cap_ms, samples, config] = arguments else {
+        return Err(Failure::Failed(format!("eight arguments, not {}", arguments.len())));
     };
     let number = |text: &String| text.parse::<usize>().map_err(|error| Failure::of(text, error));
     let is_ping = end == "ping";
@@ -57,7 +57,7 @@ fn run(arguments: &[String]) -> Result<(), Failure> {
         warm_up: number(warm_up)?,
         placement: Placement::TwoCores,
         scheduling: Scheduling::Fifo,
-        pace: None,
+        pause: Pause::Awake(Duration::from_nanos(number(pause_ns)? as u64)),
         cap: Duration::from_millis(number(cap_ms)? as u64),
     };
     TURN.get_or_init(|| PlayerTurn { is_ping, cell, samples: samples.into() });
@@ -129,6 +129,7 @@ impl Player for BallPlayer {}
 impl BallPlayer {
     fn throw(&mut self, context: &mut Context, number: u64) -> Result<(), ModuleError> {
         fill(&mut self.message, number);
+        self.turn.cell.pause.take();
         self.sent_ns = monotonic_ns();
         Ok(context.publish_now(PlayerInterface::BALL, &self.message)?)
     }

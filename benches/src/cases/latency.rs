@@ -5,7 +5,7 @@
 
 use super::case::Case;
 use super::rivals::Rival;
-use crate::harness::{Cell, Failure, Placement, Scheduling, Scratch, time_two_processes};
+use crate::harness::{Cell, Failure, Pause, Placement, Scheduling, Scratch, time_two_processes};
 use crate::ours::{How, Mailboxes};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
@@ -35,7 +35,7 @@ pub(super) struct Latency {
     how: How,
     placement: Placement,
     scheduling: Scheduling,
-    pace: Option<Duration>,
+    pause: Pause,
     /// Round trips of a turn.
     messages: usize,
     rivals: Vec<(Rival, Option<Target>, Option<Target>)>,
@@ -65,7 +65,12 @@ fn at_most(bound: f64) -> Option<Target> {
 impl Latency {
     fn new(name: &'static str, bytes: usize, how: How) -> Self {
         let (placement, scheduling, rivals) = (Placement::TwoCores, Scheduling::Fifo, Vec::new());
-        Self { name, bytes, how, placement, scheduling, pace: None, messages: MESSAGES, rivals }
+        Self { name, bytes, how, placement, scheduling, pause: Pause::None, messages: MESSAGES, rivals }
+    }
+
+    /// To a receiver that has gone to sleep.
+    fn asleep(name: &'static str, bytes: usize) -> Self {
+        Self { pause: Pause::UNTIL_ASLEEP, ..Self::new(name, bytes, How::Blocking) }
     }
 
     fn beside(mut self, rival: Rival, p50: Option<Target>, p99: Option<Target>) -> Self {
@@ -82,7 +87,7 @@ impl Latency {
 fn blocking() -> Vec<Latency> {
     let case = |bytes| {
         let (p50, p99) = if bytes <= 1024 { (at_most(1.10), at_most(1.15)) } else { (None, None) };
-        let case = Latency::new("blocking", bytes, How::Blocking).beside(Rival::Futex, p50, p99);
+        let case = Latency::asleep("blocking", bytes).beside(Rival::Futex, p50, p99);
         let case = case.beside(Rival::PosixQueue, at_most(1.0), None);
         #[cfg(feature = "peers")]
         let case = case.beside_peer(Rival::IceoryxListener);
@@ -122,15 +127,16 @@ fn loaned() -> Vec<Latency> {
 }
 
 fn normal_scheduler() -> Vec<Latency> {
-    let case = |name, how| Latency { scheduling: Scheduling::Normal, ..Latency::new(name, 64, how) };
-    let blocking = case("blocking, default scheduler", How::Blocking);
+    let case = |case| Latency { scheduling: Scheduling::Normal, ..case };
+    let blocking = case(Latency::asleep("blocking, default scheduler", 64));
     let blocking = blocking.beside(Rival::Futex, None, None).beside(Rival::PosixQueue, None, None);
-    let spinning = case("spinning, default scheduler", How::Spinning).beside(Rival::Spin, None, None);
-    vec![blocking, spinning]
+    let spinning = case(Latency::new("spinning, default scheduler", 64, How::Spinning));
+    vec![blocking, spinning.beside(Rival::Spin, None, None)]
 }
 
 fn paced() -> Vec<Latency> {
-    let case = |name, how| Latency { pace: Some(PACE), messages: MESSAGES_PACED, ..Latency::new(name, 64, how) };
+    let case =
+        |name, how| Latency { pause: Pause::Asleep(PACE), messages: MESSAGES_PACED, ..Latency::new(name, 64, how) };
     let blocking = case("blocking, paced", How::Blocking);
     let blocking = blocking.beside(Rival::Futex, None, None).beside(Rival::PosixQueue, None, None);
     let spinning = case("spinning, paced", How::Spinning).beside(Rival::Spin, None, None);
@@ -145,7 +151,7 @@ impl Latency {
             warm_up: settings.count(WARM_UP).min(self.messages / 10),
             placement: self.placement,
             scheduling: self.scheduling,
-            pace: self.pace,
+            pause: self.pause,
             cap: if self.how == How::Blocking { CAP_ASLEEP } else { CAP_AWAKE },
         }
     }

@@ -1,14 +1,14 @@
 //! Contenders that are programs, in any language: started in children that are placed and scheduled as all others are.
 //!
 //! ```text
-//!  argv    …, `ping` or `pong`, bytes, messages, warm-up, cap (ms), file for samples, …
+//!  argv    …, `ping` or `pong`, bytes, messages, warm-up, pause before each (ns), cap (ms), file for samples, …
 //!  stdout  a line each time when it is as far as the other end must be, too
 //!  stdin   a line when both ends are
 //!  file    round trips, ns: u64 each, little-endian
 //!  stderr  why it failed, if its exit code is not 0
 //! ```
 
-use super::ping_pong::{GRACE, SECOND_ENDS};
+use super::ping_pong::{GRACE, Pause, SECOND_ENDS};
 use super::{Cell, Child, End, Failure, Placement, Scheduling, Scratch, interrupted, settle};
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -40,9 +40,11 @@ pub struct ForeignProgram {
 impl ForeignProgram {
     fn command(&self, end: End, cell: &Cell, samples: &Path) -> Command {
         let end = if end == End::Ping { "ping" } else { "pong" };
-        let numbers = [cell.bytes, cell.messages, cell.warm_up].map(|number| number.to_string());
+        // None of these programs is asked to sleep.
+        let pause_ns = if let Pause::Awake(pause) = cell.pause { pause.as_nanos() } else { 0 };
+        let numbers = [cell.bytes as u128, cell.messages as u128, cell.warm_up as u128, pause_ns, cell.cap.as_millis()];
         let mut command = Command::new(&self.program);
-        command.args(&self.first).arg(end).args(numbers).arg(cell.cap.as_millis().to_string()).arg(samples);
+        command.args(&self.first).arg(end).args(numbers.map(|number| number.to_string())).arg(samples);
         command.args(&self.last).envs(self.environment.iter().cloned());
         command
     }

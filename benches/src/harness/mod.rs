@@ -24,7 +24,7 @@ pub use interrupt::{heed, interrupted, rest};
 pub use machine::Machine;
 #[cfg(feature = "peers")]
 pub use ping_pong::time_two_threads;
-pub use ping_pong::{Cell, Link, Meetings, SAMPLES_MIN, check_echo, fill, ping, pong, time_two_processes};
+pub use ping_pong::{Cell, Link, Meetings, Pause, SAMPLES_MIN, check_echo, fill, ping, pong, time_two_processes};
 pub use place::{End, Placement, Scheduling, processors, refusals, settle};
 pub use samples::{Samples, sample_in_child};
 pub use scratch::{Scratch, sweep};

@@ -37,6 +37,37 @@ pub trait Link {
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure>;
 }
 
+/// What the near end does before each message.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Pause {
+    /// Nothing: one message follows the other.
+    None,
+    /// It looks at the clock for so long.
+    Awake(Duration),
+    /// It sleeps for so long.
+    Asleep(Duration),
+}
+
+impl Pause {
+    /// Each message finds the far end asleep, and the processor of the near end awake. Without it, two ends that are
+    /// quick enough meet each other on the way to sleep, and stay awake for a whole turn, or do not: as it happens.
+    pub const UNTIL_ASLEEP: Self = Self::Awake(Duration::from_micros(20));
+
+    /// Takes it.
+    pub fn take(self) {
+        match self {
+            Self::None => {}
+            Self::Awake(pause) => {
+                let began = Instant::now();
+                while began.elapsed() < pause {
+                    std::hint::spin_loop();
+                }
+            }
+            Self::Asleep(pause) => std::thread::sleep(pause),
+        }
+    }
+}
+
 /// One turn of one contender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Cell {
@@ -50,8 +81,8 @@ pub struct Cell {
     pub placement: Placement,
     /// How.
     pub scheduling: Scheduling,
-    /// Sleep before each message; none: one after the other.
-    pub pace: Option<Duration>,
+    /// What the near end does before each message.
+    pub pause: Pause,
     /// Ends the turn with the samples so far; a quarter of it ends the warm-up. Below 0.9 s for spinning contenders:
     /// the kernel's fair server stops a real-time process that keeps others from running for 50 ms in each second.
     pub cap: Duration,
@@ -70,7 +101,7 @@ impl Cell {
             warm_up: (Self::HOP_MESSAGES / 10).min(messages / 10),
             placement: Placement::TwoCores,
             scheduling: Scheduling::Fifo,
-            pace: None,
+            pause: Pause::None,
             cap: Duration::from_secs(2),
         }
     }
@@ -127,9 +158,7 @@ pub fn ping(link: &mut impl Link, cell: &Cell) -> Result<Vec<u64>, Failure> {
     let mut is_warm = cell.warm_up == 0;
     for number in 0..(cell.warm_up + cell.messages) as u64 {
         fill(&mut message, number);
-        if let Some(pace) = cell.pace {
-            std::thread::sleep(pace);
-        }
+        cell.pause.take();
         let sent = monotonic_ns();
         link.send(&message)?;
         link.receive(&mut echo)?;
@@ -299,7 +328,7 @@ mod tests {
     fn play(near: Mishap, far: Mishap) -> [Result<(), Failure>; 2] {
         let (placement, scheduling) = (Placement::TwoCores, Scheduling::Normal);
         let cap = Duration::from_secs(5);
-        let cell = Cell { bytes: 64, messages: 20, warm_up: 2, placement, scheduling, pace: None, cap };
+        let cell = Cell { bytes: 64, messages: 20, warm_up: 2, placement, scheduling, pause: Pause::None, cap };
         let ((out, far_back), (far_out, back)) = (channel(), channel());
         let mut near = Queue { out, back, mishap: (near, 5), sent: 0, last: Vec::new() };
         let mut far = Queue { out: far_out, back: far_back, mishap: (far, 5), sent: 0, last: Vec::new() };

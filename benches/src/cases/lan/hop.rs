@@ -3,7 +3,7 @@
 
 use super::ground::{ETHERNET, LanSegment, WHOLE};
 use crate::cases::Case;
-use crate::harness::{Cell, Failure, time_two_processes};
+use crate::harness::{Cell, Failure, Pause, time_two_processes};
 use crate::lan::chain::{time_chain, time_mailbox_chain};
 use crate::lan::ends::Module;
 use crate::lan::nodes::{Network, UNPACED};
@@ -18,9 +18,9 @@ const PACE: Duration = Duration::from_micros(500);
 
 /// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let whole = |bytes| LanHop { name: "hop", bytes, mtu: WHOLE, pace: None, has_target: true };
+    let whole = |bytes| LanHop { name: "hop", bytes, mtu: WHOLE, pause: Pause::None, has_target: true };
     let mut cases = [64, 1024, 16_384, 62_000].map(whole).to_vec();
-    cases.push(LanHop { name: "hop, paced", pace: Some(PACE), has_target: false, ..whole(64) });
+    cases.push(LanHop { name: "hop, paced", pause: Pause::Asleep(PACE), has_target: false, ..whole(64) });
     cases.push(LanHop { name: "hop, in fragments", mtu: ETHERNET, has_target: false, ..whole(16_384) });
     cases.into_iter().map(|case| Box::new(case) as Box<dyn Case>).collect()
 }
@@ -30,7 +30,7 @@ struct LanHop {
     name: &'static str,
     bytes: usize,
     mtu: u16,
-    pace: Option<Duration>,
+    pause: Pause,
     /// Whether the targets apply.
     has_target: bool,
 }
@@ -45,8 +45,8 @@ impl Case for LanHop {
             settings,
             &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB", sealed: false, records: None },
         );
-        let messages = settings.count(if self.pace.is_some() { MESSAGES_PACED } else { Cell::HOP_MESSAGES });
-        let cell = Cell { pace: self.pace, ..Cell::hop(self.bytes, messages) };
+        let messages = settings.count(if self.pause == Pause::None { Cell::HOP_MESSAGES } else { MESSAGES_PACED });
+        let cell = Cell { pause: self.pause, ..Cell::hop(self.bytes, messages) };
         let contenders = [
             Contender::sampled("rohrpost", || {
                 let (nodes, turn) = ground.turn()?;

@@ -12,7 +12,7 @@
 
 use super::ground::{ETHERNET, LanSegment};
 use crate::cases::Case;
-use crate::harness::{Cell, End, Failure, time_two_processes};
+use crate::harness::{Cell, End, Failure, Pause, time_two_processes};
 use crate::lan::Wire;
 use crate::lan::ends::Module;
 use crate::lan::junk::Junk;
@@ -60,7 +60,7 @@ impl Case for LanJunk {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false, records: None };
         let ground = LanSegment::on(settings, &network, Wire::with_stranger(network.mtu));
-        let cell = Cell { pace: Some(PACE), ..Cell::hop(BYTES, settings.count(MESSAGES)) };
+        let cell = Cell { pause: Pause::Asleep(PACE), ..Cell::hop(BYTES, settings.count(MESSAGES)) };
         let rates = RefCell::new(Vec::new());
         let under_junk = |ports, timed: &dyn Fn() -> Result<Vec<f64>, Failure>| {
             let wire = ground.wire()?;

@@ -25,7 +25,7 @@
 use super::ground::LanSegment;
 use crate::cases::Case;
 use crate::harness::{
-    Cell, Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
+    Cell, Child, End, Failure, Gate, Pause, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
 };
 use crate::lan::Wire;
 use crate::lan::ends::{LanSink, LanSource, Module};
@@ -103,7 +103,7 @@ impl Case for Urgent {
             warm_up: WARM_UP.min(messages / 10),
             placement: Placement::TwoCores,
             scheduling: Scheduling::Fifo,
-            pace: Some(PACE),
+            pause: Pause::Asleep(PACE),
             cap: CAP,
         };
         let floods = [RefCell::new(Vec::new()), RefCell::new(Vec::new())];

@@ -3,7 +3,7 @@
 use super::turn::{BYTES, at_most, cell};
 use crate::cases::Case;
 use crate::cases::latency;
-use crate::harness::{Cell, Failure, ForeignProgram, Scratch, time_two_programs};
+use crate::harness::{Cell, Failure, ForeignProgram, Pause, Scratch, time_two_programs};
 use crate::languages::compile_c;
 use crate::ours::How;
 use crate::rounds::{Contender, Row, Subject, compare};
@@ -51,7 +51,7 @@ impl Case for InC {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let cell = cell(settings);
-        let cell = if self.how == How::Spinning { Cell { cap: CAP_AWAKE, ..cell } } else { cell };
+        let cell = if self.how == How::Spinning { Cell { cap: CAP_AWAKE, pause: Pause::None, ..cell } } else { cell };
         let program = compile_c();
         let contenders = [
             Contender::sampled("C", || self.turn(&program, &cell)),

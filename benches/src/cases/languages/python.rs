@@ -244,6 +244,7 @@ fn call(cell: &Cell) -> Result<Vec<f64>, Failure> {
         let (_node, motor) = reached.map_err(as_failure("a module"))?;
         let began = Instant::now();
         for number in 0..cell.warm_up + cell.messages {
+            cell.pause.take();
             let sent = Instant::now();
             motor.drive(0.5, 0.25).map_err(|error| Failure::of("drive", error))?;
             let took = sent.elapsed();

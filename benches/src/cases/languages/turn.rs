@@ -1,6 +1,6 @@
 //! What turns of all programs have in common.
 
-use crate::harness::{Cell, Placement, Scheduling};
+use crate::harness::{Cell, Pause, Placement, Scheduling};
 use crate::rounds::{Target, Versus};
 use crate::settings::Settings;
 use std::time::Duration;
@@ -21,7 +21,7 @@ pub(super) fn cell(settings: &Settings) -> Cell {
         warm_up: settings.count(WARM_UP).min(MESSAGES / 10),
         placement: Placement::TwoCores,
         scheduling: Scheduling::Fifo,
-        pace: None,
+        pause: Pause::UNTIL_ASLEEP,
         cap: CAP,
     }
 }

@@ -3,7 +3,7 @@
 use super::super::Case;
 use super::workload::{NAME, Workload};
 use crate::harness::{
-    Cell, Child, End, Failure, Link, Meetings, Placement, Scheduling, Scratch, Shared, Zeroable, given_away,
+    Cell, Child, End, Failure, Link, Meetings, Pause, Placement, Scheduling, Scratch, Shared, Zeroable, given_away,
     interrupted, require_asleep, time_two_processes,
 };
 use crate::ours::{How, Mailboxes};
@@ -59,7 +59,7 @@ impl Case for PairBeside {
             warm_up: settings.count(WARM_UP),
             placement: Placement::TwoCores,
             scheduling: Scheduling::Fifo,
-            pace: Some(PAUSE),
+            pause: Pause::Asleep(PAUSE),
             cap: CAP,
         };
         let contenders = [

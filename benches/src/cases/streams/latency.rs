@@ -5,7 +5,7 @@
 
 use crate::cases::Case;
 use crate::cases::rivals::Rival;
-use crate::harness::{Cell, Failure, Placement, Scheduling, Scratch, time_two_processes};
+use crate::harness::{Cell, Failure, Pause, Placement, Scheduling, Scratch, time_two_processes};
 use crate::ours::How;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
@@ -98,7 +98,7 @@ fn cell(settings: &Settings, how: How) -> Cell {
         warm_up: settings.count(WARM_UP).min(MESSAGES / 10),
         placement: Placement::TwoCores,
         scheduling: Scheduling::Fifo,
-        pace: None,
+        pause: if how == How::Blocking { Pause::UNTIL_ASLEEP } else { Pause::None },
         cap: if how == How::Blocking { CAP_ASLEEP } else { CAP_AWAKE },
     }
 }
