@@ -128,7 +128,8 @@ fn call_name(number: libc::c_long, arguments: [u64; 6]) -> String {
     match number {
         libc::SYS_futex if arguments[1] as i32 & 0x7f == libc::FUTEX_WAIT => "sleep".into(),
         libc::SYS_futex if arguments[1] as i32 & 0x7f == libc::FUTEX_WAKE => "wake".into(),
-        libc::SYS_sendmsg => "send".into(),
+        // A datagram in one piece is sent without a list of its pieces.
+        libc::SYS_sendmsg | libc::SYS_sendto => "send".into(),
         libc::SYS_recvmsg => "receive".into(),
         // A thread that is kept busy for long, as by being traced, pauses now and then.
         libc::SYS_clock_nanosleep => "pause".into(),
