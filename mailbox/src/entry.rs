@@ -57,10 +57,13 @@ pub(crate) struct Entry {
     pub(crate) joined_ns: AtomicU64,
     /// Not 0: it sleeps in `poll`; ring it through its pipe too.
     pub(crate) polling: AtomicU32,
+    /// Times that the module went into error.
+    pub(crate) errors: AtomicU32,
     /// What its thread has in hand. Senders touch this line only to wake it, which they do when it has nothing.
     pub(crate) mark: Mark,
 }
-const _: () = assert!(size_of::<Entry>() == 64 && offset_of!(Entry, joined_ns) == 24 && offset_of!(Entry, mark) == 40);
+const _: () = assert!(size_of::<Entry>() == 64 && offset_of!(Entry, joined_ns) == 24);
+const _: () = assert!(offset_of!(Entry, errors) == 36 && offset_of!(Entry, mark) == 40);
 
 /// One participant, as the table has it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,6 +76,8 @@ pub struct ParticipantInfo {
     pub incarnation: u32,
     /// What the module is doing; none for participants that are no modules.
     pub state: Option<ModuleState>,
+    /// Times that it went into error: tells one error from the next, however short the time between them.
+    pub errors: u32,
     /// Times that launch has started it again.
     pub restarts: u32,
     /// When it joined, on the monotonic clock.
@@ -92,6 +97,8 @@ impl Entry {
             pid: self.pid.load(Ordering::Relaxed),
             incarnation: self.incarnation.load(Ordering::Relaxed),
             state: ModuleState::from_code(self.state.load(Ordering::Acquire)),
+            // Behind the state, which is stored behind it.
+            errors: self.errors.load(Ordering::Relaxed),
             restarts: self.restarts.load(Ordering::Relaxed),
             joined_ns: self.joined_ns.load(Ordering::Relaxed),
             in_hand: self.mark.read(),

@@ -54,6 +54,7 @@ impl Participant {
             let died = entry.pid.load(Ordering::Relaxed) != 0;
             entry.state.store(0, Ordering::Relaxed);
             entry.restarts.store(0, Ordering::Relaxed);
+            entry.errors.store(0, Ordering::Relaxed);
             // The participant before may have died in its sleep.
             entry.polling.store(0, Ordering::Relaxed);
             entry.mark.clear();
@@ -94,6 +95,9 @@ impl Participant {
 
     /// Says what the module is doing, for everyone to read.
     pub fn set_state(&self, state: ModuleState) {
+        if state == ModuleState::Error {
+            self.entry().errors.fetch_add(1, Ordering::Relaxed);
+        }
         self.entry().state.store(state as u32, Ordering::Release);
     }
 

@@ -298,9 +298,15 @@ impl Child {
         node.state_of(self.name, self.process.as_ref()?.id())
     }
 
-    /// Whether it says that it is in error, and why is not known yet.
-    pub(super) fn asks_why(&mut self, node: &Node) -> bool {
-        let in_error = self.state_of(node) == Some(ModuleState::Error);
+    /// The number of the error that it says it is in.
+    pub(super) fn in_error(&self, node: &Node) -> Option<u32> {
+        let word = node.last_word_of(self.name, self.process.as_ref()?.id())?;
+        (word.state == Some(ModuleState::Error)).then_some(word.errors)
+    }
+
+    /// The same, if why is not known yet.
+    pub(super) fn asks_why(&mut self, node: &Node) -> Option<u32> {
+        let in_error = self.in_error(node);
         self.health.asks_why(in_error)
     }
 

@@ -16,8 +16,8 @@ pub(super) struct Health {
     told_ns: Option<u64>,
     /// The last that went wrong.
     error: String,
-    /// That is why it is in error now.
-    is_present: bool,
+    /// That is why it is in error now, which is the one of this number.
+    present: Option<u32>,
 }
 
 /// A part of a module's code that has not come back for long.
@@ -35,7 +35,7 @@ impl Stuck {
 
 impl Health {
     pub(super) fn new(busy_after: Duration, now: Instant) -> Self {
-        Self { busy_after, look_at: now, told_ns: None, error: String::new(), is_present: false }
+        Self { busy_after, look_at: now, told_ns: None, error: String::new(), present: None }
     }
 
     /// When to look again. A part that begins after a look is not long before `busy_after` is over once more.
@@ -53,20 +53,21 @@ impl Health {
         is_new.then_some(Stuck { in_hand, lasts })
     }
 
-    /// Whether the module says that it is in error and why is not known yet.
-    pub(super) fn asks_why(&mut self, in_error: bool) -> bool {
-        self.is_present &= in_error;
-        in_error && !self.is_present
+    /// Takes the number of the error that the module says it is in, and gives it back if why is not known yet. Between
+    /// two looks it may have been switched on again, and failed anew.
+    pub(super) fn asks_why(&mut self, in_error: Option<u32>) -> Option<u32> {
+        self.present = self.present.filter(|present| in_error == Some(*present));
+        in_error.filter(|_| self.present.is_none())
     }
 
-    /// Why it is in error.
-    pub(super) fn is_in_error(&mut self, why: String) {
-        (self.error, self.is_present) = (why, true);
+    /// Why it is in the error of this number.
+    pub(super) fn is_in_error(&mut self, number: u32, why: String) {
+        (self.error, self.present) = (why, Some(number));
     }
 
     /// Its process has ended; if it failed, so.
     pub(super) fn ended(&mut self, failure: Option<&String>) {
-        self.is_present = false;
+        self.present = None;
         if let Some(failure) = failure {
             self.error.clone_from(failure);
         }
@@ -79,7 +80,7 @@ impl Health {
 
     /// Why it is in error now, if it is.
     pub(super) fn present_error(&self) -> Option<&str> {
-        self.is_present.then_some(&self.error)
+        self.present.map(|_| self.error.as_str())
     }
 }
 
@@ -110,13 +111,17 @@ mod tests {
     #[test]
     fn an_error_is_asked_for_once_and_stays_the_last_when_it_is_over() {
         let mut health = Health::new(Duration::from_secs(1), Instant::now());
-        assert!(!health.asks_why(false) && health.asks_why(true) && health.asks_why(true));
-        health.is_in_error("no port".into());
-        assert!(!health.asks_why(true));
+        let asked = [None, Some(1), Some(1)].map(|in_error| health.asks_why(in_error));
+        assert_eq!(asked, [None, Some(1), Some(1)]);
+        health.is_in_error(1, "no port".into());
+        assert_eq!(health.asks_why(Some(1)), None);
         assert_eq!(health.present_error(), Some("no port"));
-        assert!(!health.asks_why(false));
+        assert_eq!(health.asks_why(None), None);
         assert_eq!((health.present_error(), health.error()), (None, "no port"));
-        assert!(health.asks_why(true), "it may be another one");
+        assert_eq!(health.asks_why(Some(2)), Some(2));
+        health.is_in_error(2, "no power".into());
+        assert_eq!(health.asks_why(Some(3)), Some(3), "no look came between the two");
+        assert_eq!((health.present_error(), health.error()), (None, "no power"));
         health.ended(Some(&"ended with 1".into()));
         assert_eq!((health.present_error(), health.error()), (None, "ended with 1"));
     }

@@ -20,8 +20,8 @@ const ROUTER_RESTARTS_MAX: u32 = 8;
 pub(super) struct UnderWay {
     /// Switches it on.
     pub(super) switch: Option<u32>,
-    /// Asks it why it is in error.
-    why: Option<u32>,
+    /// Asks it why it is in error: the number of that error, and the call.
+    why: Option<(u32, u32)>,
 }
 
 impl Launch {
@@ -172,7 +172,9 @@ impl Launch {
         let Some(answer) = answer else { return };
         child.runs(answer.is_ok());
         if let Err(CallError::Fault(_, Fault::ModuleError(why))) = &answer {
-            child.health().is_in_error(why.clone());
+            if let Some(error) = child.in_error(&self.node) {
+                child.health().is_in_error(error, why.clone());
+            }
         }
         // The lower layers know numbers only.
         let told = |error: CallError| error.to_string().replace(&child.name().to_string(), child.text());
@@ -183,22 +185,24 @@ impl Launch {
     /// Asks a module that says it is in error why, or looks whether it has answered. Never waits.
     pub(super) fn ask_why(&mut self, index: usize) {
         let child = &mut self.children[index];
-        let call = self.calls[index].why.take();
-        if !child.asks_why(&self.node) {
-            call.into_iter().for_each(|call| self.tool.link.forget(call));
-            return;
-        }
-        let Some(call) = call else {
-            // One that cannot be asked now is asked at the next look.
-            self.calls[index].why = self.tool.begin(child.name(), common::STATUS, common::HASH, |_| Ok(())).ok();
-            return;
+        let (asked, error) = (self.calls[index].why.take(), child.asks_why(&self.node));
+        let (error, call) = match (asked, error) {
+            (Some((of, call)), Some(error)) if of == error => (error, call),
+            (asked, error) => {
+                // It is in error no longer, or in another one.
+                asked.into_iter().for_each(|(_, call)| self.tool.link.forget(call));
+                let mut begin = || self.tool.begin(child.name(), common::STATUS, common::HASH, |_| Ok(())).ok();
+                // One that cannot be asked now is asked at the next look.
+                self.calls[index].why = error.and_then(|error| Some((error, begin()?)));
+                return;
+            }
         };
         self.tool.link.collect();
         match self.tool.link.poll_for(call, |bytes| postcard::from_bytes::<Status>(bytes)) {
-            None => self.calls[index].why = Some(call),
+            None => self.calls[index].why = Some((error, call)),
             Some(Ok(status)) if !status.error.is_empty() => {
                 let note = format!("{} is in error: {}", child.text(), plain::line(&status.error));
-                child.health().is_in_error(status.error);
+                child.health().is_in_error(error, status.error);
                 self.note(Some(note));
             }
             Some(_) => {}

@@ -237,6 +237,7 @@ travels! {
         pid: u32,
         incarnation: u32,
         state: Option<ModuleState>,
+        errors: u32,
         restarts: u32,
         joined_ns: u64,
     } without { in_hand: None };

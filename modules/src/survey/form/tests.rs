@@ -21,6 +21,7 @@ fn seen() -> Snapshot {
         pid: 4711,
         incarnation: 9,
         state: Some(ModuleState::Error),
+        errors: 1,
         restarts: 2,
         joined_ns: 5,
         in_hand: None,
