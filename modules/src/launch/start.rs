@@ -171,10 +171,10 @@ impl Launch {
         };
         let Some(answer) = answer else { return };
         child.runs(answer.is_ok());
-        if let Err(CallError::Fault(_, Fault::ModuleError(why))) = &answer {
-            if let Some(error) = child.in_error(&self.node) {
-                child.health().is_in_error(error, why.clone());
-            }
+        if let Err(CallError::Fault(_, Fault::ModuleError(why))) = &answer
+            && let Some(error) = child.in_error(&self.node)
+        {
+            child.health().is_in_error(error, why.clone());
         }
         // The lower layers know numbers only.
         let told = |error: CallError| error.to_string().replace(&child.name().to_string(), child.text());
