@@ -2,6 +2,7 @@
 
 use crate::code::{Code, Coded, text_of};
 use rohrpost_mailbox::Waiting;
+use std::any::Any;
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_void};
 use std::fmt::{Arguments, Write};
@@ -38,6 +39,7 @@ thread_local! {
 }
 
 /// Keeps the words of a failure for this thread; in a handler of signals that has interrupted just this, none.
+#[cold]
 pub(crate) fn say(code: Code, words: Arguments<'_>) -> Code {
     LAST.with(|last| {
         let Ok(mut last) = last.try_borrow_mut() else { return };
@@ -88,16 +90,20 @@ pub(crate) fn said() -> u32 {
 }
 
 /// Runs a call: what it returns becomes a code, and so does a panic.
+#[inline(always)]
 pub(crate) fn edge(call: impl FnOnce() -> Result<(), Code>) -> Code {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(())) => Code::Ok,
         Ok(Err(code)) => code,
-        Err(panic) => {
-            let text = panic.downcast_ref::<&str>().copied();
-            let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic");
-            say(Code::Bug, format_args!("a mistake in Rohrpost: {text}"))
-        }
+        Err(panic) => bug(&*panic),
     }
+}
+
+#[cold]
+fn bug(panic: &(dyn Any + Send)) -> Code {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic");
+    say(Code::Bug, format_args!("a mistake in Rohrpost: {text}"))
 }
 
 /// A place for a result, which must be there.
@@ -110,6 +116,7 @@ pub(crate) fn given<'a, T>(argument: Option<&'a T>, what: &str) -> Result<&'a T,
     argument.ok_or_else(|| null(what))
 }
 
+#[cold]
 fn null(what: &str) -> Code {
     say(Code::NullPointer, format_args!("`{what}` is a null pointer"))
 }
