@@ -64,8 +64,10 @@ pub extern "C" fn rohrpost_error_text(code: i32) -> *const c_char {
 }
 
 /// What was wrong with the last call of this thread that returned a code below 0, in a sentence that names what it was
-/// about: read it at once. The next call that fails writes there, and so do calls that have more to say of
-/// `ROHRPOST_NOTHING`, and the library before it calls a function of a module. Any thread.
+/// about; empty before there was one. Read or copy it at once: the next call of this thread that fails writes there,
+/// and so do calls that have more to say of `ROHRPOST_NOTHING`, and the library before it calls a function of a module.
+/// The place belongs to the thread: it is the same each time, never null, there until the thread ends, and no other
+/// thread may read it. Any thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_last_error() -> *const c_char {
     // Nothing of this thread writes there while C reads it, until the next call fails. Only an address: a handler of
