@@ -13,6 +13,8 @@ const PACKAGE: &str = env!("CARGO_MANIFEST_DIR");
 /// What the C program is called; it is put beside this program.
 const C_PROGRAM: &str = "rohrpost-bench-c";
 const C_LIBRARY: &str = "librohrpost_c.a";
+/// What makes the library as it is installed: optimised as a whole.
+const BUILD_C_LIBRARY: &str = "cargo rustc --release -p rohrpost-c --lib --crate-type staticlib";
 /// What a static library of Rust's needs besides.
 const SYSTEM_LIBRARIES: [&str; 5] = ["-lpthread", "-ldl", "-lm", "-lrt", "-lgcc_s"];
 /// What the interpreter may import; all that it finds is told with its version.
@@ -96,9 +98,8 @@ pub fn compile_c() -> Result<PathBuf, Failure> {
     // Cargo puts what it makes for tests into `deps` alone.
     let places = [folder.to_owned(), folder.join("deps")];
     let library = places.iter().map(|place| place.join(C_LIBRARY)).find(|library| library.is_file());
-    let library = library.ok_or_else(|| {
-        Failure::Skipped(format!("no {C_LIBRARY} in {}; cargo build --release -p rohrpost-c", folder.display()))
-    })?;
+    let library = library
+        .ok_or_else(|| Failure::Skipped(format!("no {C_LIBRARY} in {}; {BUILD_C_LIBRARY}", folder.display())))?;
     let program = folder.join(C_PROGRAM);
     // Another bench may run what it has compiled: replaced as a whole.
     let new = folder.join(format!("{C_PROGRAM}.{}", std::process::id()));

@@ -242,11 +242,13 @@ pub struct Package<'a> {
 
 impl Package<'_> {
     /// Its head; the option `redelivered` tells that an earlier receiver died with it in hand.
+    #[inline]
     pub fn head(&self) -> &Head {
         &self.head
     }
 
     /// Its body.
+    #[inline]
     pub fn body(&self) -> &[u8] {
         self.taken.as_ref().map_or(&[], |taken| self.segment.body(taken, self.head.len))
     }
@@ -257,6 +259,7 @@ impl Package<'_> {
     }
 
     /// When it was published, on the monotonic clock.
+    #[inline]
     pub fn published_ns(&self) -> u64 {
         self.published_ns
     }

@@ -126,7 +126,8 @@ fn compiled(place: &Place, source: &Path) -> PathBuf {
         .arg(source)
         .arg(format!("-I{}", client().join("include").display()))
         .arg(format!("-L{0}", library.display()))
-        .arg(format!("-Wl,-rpath,{}", library.display()))
+        // Not by the new tags, before which LD_LIBRARY_PATH counts: Cargo's leads to the library of an earlier build.
+        .arg(format!("-Wl,--disable-new-dtags,-rpath,{}", library.display()))
         .args(["-lrohrpost_c", "-lm"])
         .output()
         .unwrap();

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 const PROFILE: &str = "counted";
-/// The folder of the program that is counted, from the root.
+/// The folder of the programs that are counted, from the root.
 const FOLDER: &str = "benches/instructions";
-/// The program counts what happens inside a function of this name.
+/// They count what happens inside a function of this name.
 const FUNCTION: &str = "--toggle-collect=*counted*";
 /// Operations that are counted, of each path.
 const OPERATIONS: u64 = 5_000;
@@ -142,28 +142,34 @@ fn compiler() -> Result<String, Failure> {
     Ok(format!("{} {}", version.split_whitespace().nth(1).unwrap_or("?"), host()?))
 }
 
-/// The program, built.
-fn build() -> Result<PathBuf, Failure> {
+/// The programs, built.
+fn build() -> Result<Vec<PathBuf>, Failure> {
     let valgrind = Command::new("valgrind").arg("--version").output();
     if !valgrind.is_ok_and(|output| output.status.success()) {
         return Err("no valgrind, which counts instructions; install it: `apt-get install valgrind`".into());
     }
     let package = ["--package", "rohrpost-bench", "--no-default-features", "--features", "lan"];
-    let mut build = cargo(&["build", "--profile", PROFILE, "--bench", "instructions"]);
+    let mut build = cargo(&["build", "--profile", PROFILE, "--bench", "instructions", "--bench", "instructions-c"]);
     build.args(package);
     cargo::run("building the hot paths", &mut build)?;
-    // Cargo says which file it made; the name has a hash.
+    // Cargo says which files it made; the names have hashes.
     let output = build.arg("--message-format=json").output().map_err(|error| format!("cargo: {error}"))?;
     let text = String::from_utf8_lossy(&output.stdout);
     let made = text.split("\"executable\":\"").skip(1).filter_map(|rest| rest.split('"').next());
-    made.last().map(PathBuf::from).ok_or_else(|| "cargo names no program of the hot paths".into())
+    let mut made: Vec<PathBuf> = made.map(PathBuf::from).collect();
+    // In one order, whichever was ready first: the recorded file has it.
+    made.sort();
+    Ok(made)
 }
 
-fn count_all(program: &Path) -> Result<Vec<Count>, Failure> {
-    let list = Command::new(program).output().map_err(|error| format!("{}: {error}", program.display()))?;
-    let list = String::from_utf8_lossy(&list.stdout);
-    let counts = list.lines().map(|path| Ok((path.to_owned(), count(program, path)?)));
-    let counts = counts.collect::<Result<Vec<Count>, Failure>>()?;
+fn count_all(programs: &[PathBuf]) -> Result<Vec<Count>, Failure> {
+    let mut counts = Vec::new();
+    for program in programs {
+        let list = Command::new(program).output().map_err(|error| format!("{}: {error}", program.display()))?;
+        for path in String::from_utf8_lossy(&list.stdout).lines() {
+            counts.push((path.to_owned(), count(program, path)?));
+        }
+    }
     eprintln!("==> instructions of one operation");
     counts.iter().for_each(|(path, count)| eprintln!("    {path:<24} {count:>6}"));
     Ok(counts)

@@ -55,7 +55,7 @@ const EXCUSES: [(&str, &str); 9] = [
     ("name it with --rohrpost", "benches: cases that need the `rohrpost` command"),
     ("--manifest-path benches/zenoh", "benches: zenoh, which is built by hand"),
     ("with --python", "benches: packages for Python, which are installed by hand"),
-    ("cargo build --release -p rohrpost-c", "benches: programs in C (the library for C)"),
+    ("cargo rustc --release -p rohrpost-c", "benches: programs in C (the library for C)"),
 ];
 
 /// What is not tested, if this row says that its contender could not run here.

@@ -791,8 +791,10 @@ rohrpost_code rohrpost_interface_hash(const struct rohrpost_interface *interface
 const char *rohrpost_error_text(int32_t code);
 
 // What was wrong with the last call of this thread that returned a code below 0, in a sentence that names what it was
-// about: read it at once. The next call that fails writes there, and so do calls that have more to say of
-// `ROHRPOST_NOTHING`, and the library before it calls a function of a module. Any thread.
+// about; empty before there was one. Read or copy it at once: the next call of this thread that fails writes there,
+// and so do calls that have more to say of `ROHRPOST_NOTHING`, and the library before it calls a function of a module.
+// The place belongs to the thread: it is the same each time, never null, there until the thread ends, and no other
+// thread may read it. Any thread.
 const char *rohrpost_last_error(void);
 
 // Begins to write values into `room` bytes. Any thread, as for all functions of encoders and decoders: they belong to

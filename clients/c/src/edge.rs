@@ -2,6 +2,7 @@
 
 use crate::code::{Code, Coded, text_of};
 use rohrpost_mailbox::Waiting;
+use std::any::Any;
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_void};
 use std::fmt::{Arguments, Write};
@@ -38,6 +39,7 @@ thread_local! {
 }
 
 /// Keeps the words of a failure for this thread; in a handler of signals that has interrupted just this, none.
+#[cold]
 pub(crate) fn say(code: Code, words: Arguments<'_>) -> Code {
     LAST.with(|last| {
         let Ok(mut last) = last.try_borrow_mut() else { return };
@@ -62,8 +64,10 @@ pub extern "C" fn rohrpost_error_text(code: i32) -> *const c_char {
 }
 
 /// What was wrong with the last call of this thread that returned a code below 0, in a sentence that names what it was
-/// about: read it at once. The next call that fails writes there, and so do calls that have more to say of
-/// `ROHRPOST_NOTHING`, and the library before it calls a function of a module. Any thread.
+/// about; empty before there was one. Read or copy it at once: the next call of this thread that fails writes there,
+/// and so do calls that have more to say of `ROHRPOST_NOTHING`, and the library before it calls a function of a module.
+/// The place belongs to the thread: it is the same each time, never null, there until the thread ends, and no other
+/// thread may read it. Any thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_last_error() -> *const c_char {
     // Nothing of this thread writes there while C reads it, until the next call fails. Only an address: a handler of
@@ -88,16 +92,20 @@ pub(crate) fn said() -> u32 {
 }
 
 /// Runs a call: what it returns becomes a code, and so does a panic.
+#[inline(always)]
 pub(crate) fn edge(call: impl FnOnce() -> Result<(), Code>) -> Code {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(())) => Code::Ok,
         Ok(Err(code)) => code,
-        Err(panic) => {
-            let text = panic.downcast_ref::<&str>().copied();
-            let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic");
-            say(Code::Bug, format_args!("a mistake in Rohrpost: {text}"))
-        }
+        Err(panic) => bug(&*panic),
     }
+}
+
+#[cold]
+fn bug(panic: &(dyn Any + Send)) -> Code {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic");
+    say(Code::Bug, format_args!("a mistake in Rohrpost: {text}"))
 }
 
 /// A place for a result, which must be there.
@@ -110,6 +118,7 @@ pub(crate) fn given<'a, T>(argument: Option<&'a T>, what: &str) -> Result<&'a T,
     argument.ok_or_else(|| null(what))
 }
 
+#[cold]
 fn null(what: &str) -> Code {
     say(Code::NullPointer, format_args!("`{what}` is a null pointer"))
 }

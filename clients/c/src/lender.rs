@@ -28,22 +28,29 @@ impl<T, B> Lender<T, B> {
         Some(unsafe { self.value.as_mut() })
     }
 
-    /// Lends something of the value, in place of what was lent before.
+    /// Lends something of the value, in place of what was lent before, and tells of it.
     ///
     /// # Safety
     /// `lend` keeps nothing of the value but what it returns in `Ok`.
+    #[inline(always)]
     pub(crate) unsafe fn lend<E>(
         &mut self,
-        lend: impl FnOnce(&'static mut T) -> Result<Option<B>, E>,
-    ) -> Result<Option<&mut B>, E>
+        lend: impl FnOnce(&'static mut T) -> Result<B, E>,
+        tell: impl FnOnce(&mut B),
+    ) -> Result<(), E>
     where
         T: 'static,
     {
         self.lent = None;
         // SAFETY: the box lives as long as this lender, which drops what is lent before it uses or drops the value.
         let value = unsafe { &mut *self.value.as_ptr() };
-        self.lent = lend(value)?;
-        Ok(self.lent.as_mut())
+        let lent = lend(value)?;
+        // What is replaced is none, and nothing to be dropped. Where a drop could panic here, what is lent would be put
+        // together on the stack and copied from there, which takes longer than to receive it (`cargo xtask
+        // instructions`, c-receive).
+        std::mem::forget(self.lent.replace(lent));
+        self.lent.as_mut().map(tell);
+        Ok(())
     }
 
     /// The value, without what was lent.

@@ -184,12 +184,13 @@ pub extern "C" fn rohrpost_loan(
         let (body, room) = (place(body, "body")?, place(room, "room")?);
         table::with(sender.id, |sender: &mut SenderObject| {
             unlent(sender)?;
+            let tell = |loan: &mut Loan<'_>| {
+                let lent = loan.body();
+                room.write(lent.len());
+                body.write(lent.as_mut_ptr());
+            };
             // SAFETY: nothing of the sender is kept but the loan.
-            let loan = unsafe { sender.lend(|sender| sender.loan(Priority(priority)).map(Some)) }.map_err(failed)?;
-            let lent = loan.map_or(&mut [][..], |loan| loan.body());
-            room.write(lent.len());
-            body.write(lent.as_mut_ptr());
-            Ok(())
+            unsafe { sender.lend(|sender| sender.loan(Priority(priority)), tell) }.map_err(failed)
         })
     })
 }
@@ -255,7 +256,7 @@ pub extern "C" fn rohrpost_receive(
     timeout_ns: i64,
     package: Option<&mut MaybeUninit<PackageInHand>>,
 ) -> Code {
-    receive(receiver, package, timeout_ns, 0)
+    receive(receiver, timeout_ns, 0, package)
 }
 
 /// The same; before it sleeps, it looks again and again for `spin_ns`, which takes a whole processor.
@@ -266,30 +267,38 @@ pub extern "C" fn rohrpost_receive_spinning(
     spin_ns: u64,
     package: Option<&mut MaybeUninit<PackageInHand>>,
 ) -> Code {
-    receive(receiver, package, timeout_ns, spin_ns)
+    receive(receiver, timeout_ns, spin_ns, package)
 }
 
 fn receive(
     receiver: ReceiverHandle,
-    package: Option<&mut MaybeUninit<PackageInHand>>,
     timeout_ns: i64,
     spin_ns: u64,
+    package: Option<&mut MaybeUninit<PackageInHand>>,
+) -> Code {
+    match timeout_ns {
+        0 => hand_out(receiver, package, |receiver| receiver.try_receive()),
+        _ => hand_out(receiver, package, |receiver| receiver.receive_timeout(waiting(timeout_ns, spin_ns))),
+    }
+}
+
+#[inline(always)]
+fn hand_out(
+    receiver: ReceiverHandle,
+    package: Option<&mut MaybeUninit<PackageInHand>>,
+    take: impl FnOnce(&'static mut Receiver) -> Option<Package<'static>>,
 ) -> Code {
     edge(|| {
         let out = place(package, "package")?;
         table::with(receiver.id, |receiver: &mut ReceiverObject| {
-            let take = |receiver: &'static mut Receiver| match timeout_ns {
-                0 => receiver.try_receive(),
-                timeout_ns => receiver.receive_timeout(waiting(timeout_ns, spin_ns)),
-            };
+            let tell = |package: &mut Package<'_>| _ = out.write(in_hand(package));
             // SAFETY: nothing of the receiver is kept but the package.
-            let taken = unsafe { receiver.lend(|receiver| Ok::<_, Code>(take(receiver))) }?;
-            out.write(in_hand(taken.ok_or(Code::Nothing)?));
-            Ok(())
+            unsafe { receiver.lend(|receiver| take(receiver).ok_or(()), tell) }.map_err(|()| Code::Nothing)
         })
     })
 }
 
+#[inline(always)]
 fn in_hand(package: &Package<'_>) -> PackageInHand {
     let head = package.head();
     PackageInHand {

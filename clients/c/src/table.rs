@@ -19,6 +19,10 @@ use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
 /// Places of a table.
 const PLACES_MAX: usize = 1 << 16;
+const PLACE_MASK: u64 = PLACES_MAX as u64 - 1;
+const KIND_MASK: u64 = 0xff << 16;
+/// From one turn of a place to the next.
+const TURN: u64 = 1 << 24;
 /// Threads are told apart by so many bits.
 const THREAD_MASK: u32 = (1 << 24) - 1;
 
@@ -28,10 +32,24 @@ static OF_PARENT: AtomicPtr<Vec<Place>> = AtomicPtr::new(std::ptr::null_mut());
 static THREADS: AtomicU32 = AtomicU32::new(0);
 
 struct Place {
-    turn: u16,
+    /// Of the object; without one, of the next, but for its kind.
+    handle: u64,
     /// Its turns are used up: never again, so that no old handle finds another's object.
     is_spent: bool,
     object: Option<Object>,
+}
+
+impl Place {
+    /// What is there leaves, and its handle leads to nothing from now on.
+    fn vacate(&mut self) -> Option<Object> {
+        let next = self.handle.wrapping_add(TURN);
+        if next >> 40 == self.handle >> 40 {
+            self.handle = next;
+        } else {
+            self.is_spent = true;
+        }
+        self.object.take()
+    }
 }
 
 pub(crate) struct Table {
@@ -68,42 +86,49 @@ impl Table {
             return Err(say(Code::Crowded, format_args!("this thread has {PLACES_MAX} open handles; close some")));
         }
         if free.is_none() {
-            self.places.push(Place { turn: 0, is_spent: false, object: None });
+            self.places.push(Place {
+                handle: u64::from(self.thread) << 40 | index as u64,
+                is_spent: false,
+                object: None,
+            });
         }
         let place = &mut self.places[index];
         place.object = Some(object);
-        let [thread, turn, kind] = [u64::from(self.thread), u64::from(place.turn), u64::from(kind)];
-        Ok(thread << 40 | turn << 24 | kind << 16 | index as u64)
+        place.handle = place.handle & !KIND_MASK | u64::from(kind) << 16;
+        Ok(place.handle)
     }
 
-    /// The place of a handle, if that is open here.
-    #[inline]
-    fn place<K: Kind>(&mut self, handle: u64) -> Result<&mut Place, Code> {
-        let (thread, kind) = ((handle >> 40) as u32, (handle >> 16) as u8);
-        if thread != self.thread || kind != K::NUMBER || self.is_forked() {
-            return Err(self.refuse::<K>(thread, kind));
-        }
-        let place = self.places.get_mut((handle & 0xffff) as usize);
-        place.filter(|place| place.object.is_some() && place.turn == (handle >> 24) as u16).ok_or_else(closed::<K>)
+    /// The place of a handle, if this is its table. One comparison for all that a handle says.
+    #[inline(always)]
+    fn place(&mut self, handle: u64) -> Option<&mut Place> {
+        let is_forked = self.is_forked();
+        let place = self.places.get_mut((handle & PLACE_MASK) as usize);
+        place.filter(|place| place.handle == handle && !is_forked)
     }
 
     /// What a handle stands for.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn find<K: Kind>(&mut self, handle: u64) -> Result<&mut K, Code> {
-        self.place::<K>(handle)?.object.as_mut().and_then(K::find).ok_or_else(closed::<K>)
+        let (thread, is_forked) = (self.thread, self.is_forked());
+        let object = self.place(handle).and_then(|place| place.object.as_mut());
+        object.and_then(K::find).ok_or_else(|| refusal::<K>(handle, thread, is_forked))
     }
+}
 
-    #[cold]
-    fn refuse<K: Kind>(&self, thread: u32, kind: u8) -> Code {
-        let what = K::WHAT;
-        if thread == 0 || kind != K::NUMBER {
-            return say(Code::Handle, format_args!("this is no handle of a {what}"));
-        }
-        if thread != self.thread {
-            return say(Code::Thread, format_args!("this {what} belongs to another thread, which opened it"));
-        }
-        forked()
+/// Why a handle leads to no object of this kind in the table of this thread.
+#[cold]
+fn refusal<K: Kind>(handle: u64, own: u32, is_forked: bool) -> Code {
+    let (thread, what) = ((handle >> 40) as u32, K::WHAT);
+    if thread == 0 || !is_a::<K>(handle) {
+        return say(Code::Handle, format_args!("this is no handle of a {what}"));
     }
+    if thread != own {
+        return say(Code::Thread, format_args!("this {what} belongs to another thread, which opened it"));
+    }
+    if is_forked {
+        return forked();
+    }
+    closed::<K>()
 }
 
 #[cold]
@@ -127,6 +152,7 @@ impl Drop for Table {
 }
 
 /// Uses this thread's table; not while it is used, as a handler of signals would.
+#[inline(always)]
 pub(crate) fn with_table<T>(use_it: impl FnOnce(&mut Table) -> Result<T, Code>) -> Result<T, Code> {
     let used = TABLE.try_with(|table| match table.try_borrow_mut() {
         Ok(mut table) => use_it(&mut table),
@@ -149,7 +175,7 @@ pub(crate) fn is_a<K: Kind>(handle: u64) -> bool {
 }
 
 /// Uses what a handle stands for.
-#[inline]
+#[inline(always)]
 pub(crate) fn with<K: Kind, T>(handle: u64, use_it: impl FnOnce(&mut K) -> Result<T, Code>) -> Result<T, Code> {
     with_table(|table| use_it(table.find(handle)?))
 }
@@ -157,15 +183,7 @@ pub(crate) fn with<K: Kind, T>(handle: u64, use_it: impl FnOnce(&mut K) -> Resul
 /// Closes a handle, and gives what it stood for.
 pub(crate) fn close<K: Kind>(handle: u64) -> Result<K, Code> {
     with_table(|table| {
-        let place = table.place::<K>(handle)?;
-        if place.object.as_mut().and_then(K::find).is_none() {
-            // A handle that nobody was given: its number says another kind than that of the object.
-            return Err(closed::<K>());
-        }
-        match place.turn.checked_add(1) {
-            Some(turn) => place.turn = turn,
-            None => place.is_spent = true,
-        }
-        place.object.take().and_then(K::take).ok_or_else(closed::<K>)
+        table.find::<K>(handle)?;
+        table.place(handle).and_then(Place::vacate).and_then(K::take).ok_or_else(closed::<K>)
     })
 }

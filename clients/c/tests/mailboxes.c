@@ -287,13 +287,18 @@ static void waits_for_mailboxes_streams_and_descriptors(rohrpost_node node) {
 struct shared {
     const char *directory;
     rohrpost_receiver receiver;
+    const char *said;
 };
 
 static void *of_another_thread(void *argument) {
     const struct shared *shared = (const struct shared *)argument;
     rohrpost_package package;
+    // Each thread has a place of its own, in which there is nothing yet.
+    const char *said = rohrpost_last_error();
+    CHECK(said != shared->said && *said == 0);
     GIVES(ROHRPOST_THREAD, rohrpost_receive(shared->receiver, 0, &package));
     SAYS("another thread");
+    CHECK(rohrpost_last_error() == said);
     rohrpost_node node;
     DONE(rohrpost_node_open_directory(shared->directory, false, 0, &node));
     rohrpost_sender sender = sender_to(node, OWN);
@@ -303,7 +308,7 @@ static void *of_another_thread(void *argument) {
 }
 
 static void handles_belong_to_their_thread_and_process(rohrpost_node node, const char *directory) {
-    struct shared shared = {directory, receiver_at(node, OWN)};
+    struct shared shared = {directory, receiver_at(node, OWN), rohrpost_last_error()};
     pthread_t thread;
     CHECK(pthread_create(&thread, NULL, of_another_thread, &shared) == 0);
     rohrpost_package package;

@@ -26,7 +26,8 @@ fn is_there(program: &str) -> bool {
 
 /// Compiles a program of this folder with warnings as errors, linked with the shared library of this build.
 fn compiled(folder: &Path, way: (&str, &[&str]), source: &str) -> PathBuf {
-    let rpath = format!("-Wl,-rpath,{}", libraries().display());
+    // Not by the new tags, before which LD_LIBRARY_PATH counts: Cargo's leads to the library of an earlier build.
+    let rpath = format!("-Wl,--disable-new-dtags,-rpath,{}", libraries().display());
     linked(folder, way, source, &[&rpath, "-lrohrpost_c", "-lm"])
 }
 
@@ -59,8 +60,6 @@ fn linked(folder: &Path, (compiler, options): (&str, &[&str]), source: &str, lib
 /// Runs it with a directory for a node of its own; what it prints before it says that all is well.
 fn runs(mut command: Command, folder: &Path) -> String {
     command.arg(folder.join("node")).env_remove("ROHRPOST_CONFIG");
-    // Cargo's would lead to the library of an earlier `cargo build`.
-    command.env_remove("LD_LIBRARY_PATH");
     let output = command.output().unwrap();
     let [printed, said] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let printed = printed.strip_suffix("all is well\n").filter(|_| output.status.success());
@@ -83,16 +82,23 @@ fn every_way(source: &str, prints: &str) {
 
 /// Every byte that is read was written, and every one is given back.
 fn by_valgrind(source: &str) {
+    let folder = tempfile::tempdir_in("/dev/shm").unwrap();
+    if let Some(command) = valgrind(folder.path(), source) {
+        runs(command, folder.path());
+    }
+}
+
+/// A program under valgrind, if that is there.
+fn valgrind(folder: &Path, source: &str) -> Option<Command> {
     if !is_there("valgrind") {
         skipped("C by valgrind, which is not there");
-        return;
+        return None;
     }
-    let folder = tempfile::tempdir_in("/dev/shm").unwrap();
-    let program = compiled(folder.path(), ("gcc", &["-std=c11", "-g"]), source);
+    let program = compiled(folder, ("gcc", &["-std=c11", "-g"]), source);
     let mut command = Command::new("valgrind");
     command.args(["--quiet", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite"]);
     command.arg(format!("--suppressions={}/tests/valgrind.supp", env!("CARGO_MANIFEST_DIR"))).arg(program);
-    runs(command, folder.path());
+    Some(command)
 }
 
 #[test]
@@ -194,4 +200,15 @@ fn mailboxes_and_streams_by_valgrind() {
 #[test]
 fn values_by_valgrind() {
     by_valgrind("values.c");
+}
+
+#[test]
+fn valgrind_finds_what_c_did_not_set() {
+    let folder = tempfile::tempdir_in("/dev/shm").unwrap();
+    if let Some(mut command) = valgrind(folder.path(), "unset.c") {
+        let output = command.arg(folder.path().join("node")).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        // In the library alone: the program looks at nothing that comes of it.
+        assert!(output.status.code() == Some(9) && said.contains("Conditional jump"), "{said}");
+    }
 }

@@ -112,40 +112,32 @@ pub extern "C" fn rohrpost_stream_next(
     record: Option<&mut MaybeUninit<Record>>,
     lost: Option<&mut MaybeUninit<u64>>,
 ) -> Code {
-    edge(|| {
-        let out = place(record, "record")?;
-        table::with(reader.id, |reader: &mut ReaderObject| {
-            let mut passed = None;
-            let take = |reader: &'static mut StreamReader| {
-                let next = match timeout_ns {
-                    0 => reader.try_next(),
-                    timeout_ns => reader.next_timeout(waiting(timeout_ns, 0)),
-                };
-                Ok(match next.map_err(failed)? {
-                    Next::Record(record) => Some(record),
-                    Next::Lost(count) => {
-                        passed = Some(count);
-                        None
-                    }
-                    Next::Nothing => None,
-                })
-            };
-            // SAFETY: nothing of the reader is kept but the record.
-            let taken = unsafe { reader.lend(take) }?;
-            if let (Some(lost), count) = (lost, passed.unwrap_or(0)) {
-                lost.write(count);
+    let mut passed = 0;
+    let code = hand_out(reader, record, |reader| {
+        let next = match timeout_ns {
+            0 => reader.try_next(),
+            timeout_ns => reader.next_timeout(waiting(timeout_ns, 0)),
+        };
+        match next.map_err(failed)? {
+            Next::Record(record) => Ok(record),
+            Next::Lost(count) => {
+                passed = count;
+                Err(Code::Lost)
             }
-            out.write(in_hand(taken.ok_or(if passed.is_some() { Code::Lost } else { Code::Nothing })?));
-            Ok(())
-        })
-    })
+            Next::Nothing => Err(Code::Nothing),
+        }
+    });
+    if let (Some(lost), 0..) = (lost, code as i32) {
+        lost.write(passed);
+    }
+    code
 }
 
 /// Takes the newest record, to be read in place, as `rohrpost_stream_next` does; the position stays.
 /// `ROHRPOST_NOTHING` before the first.
 #[unsafe(no_mangle)]
 pub extern "C" fn rohrpost_stream_newest(reader: ReaderHandle, record: Option<&mut MaybeUninit<Record>>) -> Code {
-    hand_out(reader, record, |reader| reader.newest().map_err(failed))
+    hand_out(reader, record, |reader| reader.newest().map_err(failed)?.ok_or(Code::Nothing))
 }
 
 /// Takes the record of this sequence, to be read in place, as `rohrpost_stream_next` does; the position stays.
@@ -156,21 +148,20 @@ pub extern "C" fn rohrpost_stream_record(
     sequence: u64,
     record: Option<&mut MaybeUninit<Record>>,
 ) -> Code {
-    hand_out(reader, record, |reader| Ok(reader.record(sequence)))
+    hand_out(reader, record, |reader| reader.record(sequence).ok_or(Code::Nothing))
 }
 
 fn hand_out(
     reader: ReaderHandle,
     record: Option<&mut MaybeUninit<Record>>,
-    take: impl FnOnce(&'static mut StreamReader) -> Result<Option<HeldRecord<'static>>, Code>,
+    take: impl FnOnce(&'static mut StreamReader) -> Result<HeldRecord<'static>, Code>,
 ) -> Code {
     edge(|| {
         let out = place(record, "record")?;
         table::with(reader.id, |reader: &mut ReaderObject| {
+            let tell = |record: &mut HeldRecord<'_>| _ = out.write(in_hand(record));
             // SAFETY: nothing of the reader is kept but the record.
-            let taken = unsafe { reader.lend(take) }?;
-            out.write(in_hand(taken.ok_or(Code::Nothing)?));
-            Ok(())
+            unsafe { reader.lend(take, tell) }
         })
     })
 }

@@ -83,12 +83,13 @@ pub extern "C" fn rohrpost_stream_begin(
         let (body, room) = (place(body, "body")?, place(room, "room")?);
         table::with(writer.id, |writer: &mut WriterObject| {
             idle(writer)?;
+            let tell = |record: &mut OpenRecord<'_>| {
+                let lent = record.body_mut();
+                room.write(lent.len());
+                body.write(lent.as_mut_ptr());
+            };
             // SAFETY: nothing of the writer is kept but the record.
-            let begun = unsafe { writer.lend(|writer| writer.begin(stamp(at)).map(Some)) }.map_err(failed)?;
-            let lent = begun.map_or(&mut [][..], |record| record.body_mut());
-            room.write(lent.len());
-            body.write(lent.as_mut_ptr());
-            Ok(())
+            unsafe { writer.lend(|writer| writer.begin(stamp(at)), tell) }.map_err(failed)
         })
     })
 }
