@@ -210,12 +210,13 @@ class Readers(unittest.TestCase):
         small = Struct(Named("Small", 3, (Field("a", U8),)))
         many = bytes([0xFF, 0xFF, 0xFF, 0x1F])  # 64 Mi of them
         limit = r"more than 1000000 values in one; send many numbers as bytes, or as lists of f32 or f64"
-        for type, data, where in [
+        cases: list[tuple[Type, bytes, str]] = [
             (List(small), many + bytes(1 << 26), ""),
             (Struct(Named("S", 3, (Field("of", Map(U8, U8)),))), many + bytes(1 << 26), r"of\[\d+\]: "),
             (Array(1_000_000, U8), bytes(1_000_000), ""),
             (Array(2, Array(500_000, U8)), bytes(1_000_000), r"\[1\]: "),
-        ]:
+        ]
+        for type, data, where in cases:
             for _ in range(3):
                 with self.assertRaisesRegex(WalkError, f"^{where}{limit}"):
                     decode(type, data)

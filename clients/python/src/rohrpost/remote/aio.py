@@ -262,7 +262,9 @@ class AsyncClient(Shell):
                 if line is not None:
                     line.drop()
                 line = self._line = None
-            elif step is Step.WRITE and line is not None and line.write():
+                if self._connecting is not None:
+                    self._connecting.cancel()
+            elif step is Step.WRITE and line is not None and line.writes():
                 continue
             break
         wait_ns = until_ns - passed_ns() if step is Step.WAIT else 100_000_000 if step is Step.WRITE else 0
@@ -315,8 +317,16 @@ class _Line(asyncio.Protocol):
         self._is_paused = False
         self._client._soon()
 
-    def write(self) -> bool:
+    def writes(self) -> bool:
         """Writes what is ready; whether the stream takes more."""
+        try:
+            return self._write()
+        except Exception as error:  # As for what comes.
+            self.drop()
+            self._client._broken(self, broken(error, "what is ready cannot be sent"))
+            return False
+
+    def _write(self) -> bool:
         if self._is_paused or not self.transport.is_ready:
             return False
         session = self._client._core.session

@@ -18,7 +18,8 @@ import struct
 from typing import Any
 
 from .errors import WalkError, counted, plain
-from .readers import READERS, Lend, Reader
+from .readers import READERS
+from .scalars import Lend, Reader
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, VALUES_MAX, Array, Enum, List, Map, Named, Option, Plain, Struct,
     Tuple, Type, Variant, float_of, is_byte, is_nullable, unwrapped,
