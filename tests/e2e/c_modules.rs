@@ -77,7 +77,12 @@ impl Module for Looker {
     type Interfaces = LookingInterface;
 
     fn new(_: LookerSettings, context: &mut Context) -> Result<Self, ModuleError> {
-        Ok(Self { pictures: context.subscribe_stream(CameraInterface::IMAGE, "camera.0")?, seen: 0, ahead: None, jumps: 0 })
+        Ok(Self {
+            pictures: context.subscribe_stream(CameraInterface::IMAGE, "camera.0")?,
+            seen: 0,
+            ahead: None,
+            jumps: 0,
+        })
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {

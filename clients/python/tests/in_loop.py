@@ -1,4 +1,4 @@
-"""A client of asyncio, used as the synchronous one is: so that one test is for both. Its loop has a thread of its own."""
+"""A client of asyncio, used as the synchronous one is, so that one test is for both. Its loop has its own thread."""
 
 from __future__ import annotations
 

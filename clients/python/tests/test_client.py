@@ -221,6 +221,22 @@ class Clients(unittest.TestCase):
             before = self.call("count", 7)
             wait(lambda: beats.next(20).value == before)
 
+    def test_what_is_closed_ends_there_and_here(self) -> None:
+        def subscribers() -> int:
+            count: int = self.client.status("probe.0", 20).subscribers
+            return count
+
+        with self.client.subscribe("probe.0", "beat") as beats:
+            beats.next(20)
+            self.assertEqual(subscribers(), 1)
+        wait(lambda: subscribers() == 0)
+        beats.close()
+        with self.assertRaisesRegex(rp.Misuse, "this subscription is closed"):
+            while True:
+                beats.next(20)
+        self.client.close()
+        beats.close()
+
     def test_what_a_module_publishes_itself_is_its_newest_data(self) -> None:
         publish = self.by_the_host(self.probe.publish)
         publish("word", "hello", 123)

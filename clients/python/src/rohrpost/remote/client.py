@@ -29,7 +29,6 @@ from .handles import ModuleHost, Proxy, RecordStream, Subscription
 from .line import Ears, Line, Waiting
 from .session import Settings, Step
 from .shell import Shell
-from .streams import Wanted
 from .timing import SystemTime
 from .transport import Plain, Sealed
 
@@ -207,11 +206,7 @@ class Client(Shell):
         """
         subscription = Subscription(self, 1 if newest else room)
         with self._locked():
-            self._core.now_ns = passed_ns()
-            subscription._following = self._core.follow(
-                self._core.own, self.name(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
-                subscription._take, subscription._said,
-            )  # fmt: skip
+            self._follow(subscription, name, data, period_s, newest, expected)
         self._wake()
         return subscription
 
@@ -231,12 +226,8 @@ class Client(Shell):
         ``rohrpost.Image``. Records of more than ``most_bytes`` are not taken.
         """
         reading = RecordStream(self, room)
-        type = calling.expected_type(expected)
-        wanted = Wanted(self.name(name), stream, type, most_bytes, reading._take, reading._said)
         with self._locked():
-            self._core.streams.add(passed_ns(), wanted)
-        reading._wanted = wanted
-        reading._takes_from(wanted.assembly)
+            self._read_records(reading, name, stream, expected, most_bytes)
         self._wake()
         return reading
 

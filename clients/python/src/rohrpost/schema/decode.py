@@ -21,8 +21,8 @@ from .errors import WalkError, counted, plain
 from .readers import READERS
 from .scalars import Lend, Reader
 from .tree import (
-    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, VALUES_MAX, Array, Enum, List, Map, Named, Option, Plain, Struct,
-    Tuple, Type, Variant, float_of, is_byte, is_nullable, unwrapped,
+    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, VALUES_MAX, Array, Enum, List, Map, Named, Option, Plain,
+    Struct, Tuple, Type, Variant, float_of, is_byte, is_empty, is_nullable, unwrapped,
 )  # fmt: skip
 
 _READER = READERS.name
@@ -141,7 +141,7 @@ class Decoder:
     def many(self, type: Type, length: int) -> list[Any]:
         if float_of(type):
             self.left += length  # They are small, and read at once otherwise.
-        if length > self.left:
+        if length > self.left and not is_empty(type):
             raise _too_many()
         return [self.element(type, index) for index in range(length)]
 
