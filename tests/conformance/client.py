@@ -1,4 +1,5 @@
-"""The client in Python under the conformance suite: answers the questions of the line protocol with the package."""
+"""The client in Python under the conformance suite: answers the questions of the line protocol with the package.
+``--asyncio``: the client for asyncio takes part at the TCP router."""
 
 import concurrent.futures
 import json
@@ -6,8 +7,10 @@ import json
 import pathlib
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "clients" / "python" / "src"))
+PACKAGE = pathlib.Path(__file__).parents[2] / "clients" / "python"
+sys.path[:0] = [str(PACKAGE / "src"), str(PACKAGE / "tests")]
 
+import in_loop  # noqa: E402
 import rohrpost as rp  # noqa: E402
 from rohrpost import remote, schema, wire  # noqa: E402
 from rohrpost.faults import Fault  # noqa: E402
@@ -101,7 +104,8 @@ class Live:
         own = Name.parse(ask["own"])
         installation = remote.Installation.with_digests(own.system, ask["digests"])
         big_endian = ask["order"] == "big"
-        self.client = remote.connect(ask["server"], own, installation, big_endian=big_endian, timeout_s=20)
+        connect = in_loop.connect if "--asyncio" in sys.argv else remote.connect
+        self.client = connect(ask["server"], own, installation, big_endian=big_endian, timeout_s=20)
         self.client.host(own, Probing())
         return True
 

@@ -55,6 +55,9 @@ trait Looking {
     /// How many whole pictures it has seen.
     #[command(16)]
     fn seen(&mut self) -> u64;
+    /// How often pictures and records were not counted alike; once for each restart of the camera.
+    #[command(17)]
+    fn jumps(&mut self) -> u64;
 }
 
 #[derive(Deserialize)]
@@ -64,6 +67,9 @@ struct LookerSettings {}
 struct Looker {
     pictures: StreamSubscription<Image>,
     seen: u64,
+    /// By how much the number of the last picture was ahead of its record's.
+    ahead: Option<u8>,
+    jumps: u64,
 }
 
 impl Module for Looker {
@@ -71,7 +77,12 @@ impl Module for Looker {
     type Interfaces = LookingInterface;
 
     fn new(_: LookerSettings, context: &mut Context) -> Result<Self, ModuleError> {
-        Ok(Self { pictures: context.subscribe_stream(CameraInterface::IMAGE, "camera.0")?, seen: 0 })
+        Ok(Self {
+            pictures: context.subscribe_stream(CameraInterface::IMAGE, "camera.0")?,
+            seen: 0,
+            ahead: None,
+            jumps: 0,
+        })
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
@@ -84,6 +95,10 @@ impl Module for Looker {
                 return Err(ModuleError::new(format!("row {row} is of two pictures")));
             }
         }
+        let number = picture.rows()?.next().map_or(0, |pixels| pixels[0]);
+        let ahead = number.wrapping_sub(data.head.sequence as u8);
+        self.jumps += u64::from(self.ahead.is_some_and(|before| before != ahead));
+        self.ahead = Some(ahead);
         self.seen += 1;
         Ok(())
     }
@@ -92,6 +107,10 @@ impl Module for Looker {
 impl Looking for Looker {
     fn seen(&mut self) -> u64 {
         self.seen
+    }
+
+    fn jumps(&mut self) -> u64 {
+        self.jumps
     }
 }
 
@@ -114,7 +133,7 @@ fn book(place: &Place, name: &str) -> PathBuf {
 
 /// Compiles a program with the library that Cargo has put beside this one. Wherever it reads or writes what is not its
 /// own, it ends, and its test fails.
-fn compiled(place: &Place, source: &Path) -> PathBuf {
+pub(crate) fn compiled(place: &Place, source: &Path) -> PathBuf {
     let library = std::env::current_exe().unwrap().parent().unwrap().to_owned();
     let program = place.path(source.file_stem().unwrap().to_str().unwrap());
     let is_c = source.extension().unwrap() == "c";
@@ -142,7 +161,12 @@ pub(crate) fn entry(name: &str, program: &str, more: &str) -> String {
 
 /// What a module says that it has seen.
 pub(crate) fn seen(place: &Place, module: &str) -> u64 {
-    place.say(&["call", module, "seen"]).ok().trim().parse().unwrap()
+    said(place, module, "seen")
+}
+
+/// What a module says that it has counted.
+pub(crate) fn said(place: &Place, module: &str, function: &str) -> u64 {
+    place.say(&["call", module, function]).ok().trim().parse().unwrap()
 }
 
 fn stop(place: &Place, robot: Robot, launch: &mut Running) {

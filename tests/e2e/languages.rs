@@ -262,8 +262,12 @@ fn a_client_in_python_conforms_at_a_tcp_router() {
     let (run, client) = (suite.join("run.py"), suite.join("client.py"));
     let (run, client) = (run.to_str().unwrap(), client.to_str().unwrap());
     let digests = scene.digests();
-    let said = scene.python(&[run, "--live", SERVER, &digests, "--", "python3", "-B", client]).said().ok();
-    assert!(said.starts_with("conforms: "), "{said}");
+    let live = ["--live", SERVER, &digests, "--", "python3", "-B", client];
+    let in_loop = [&[run, "--only-live"], &live[..], &["--asyncio"]].concat();
+    for suite in [[&[run], &live[..]].concat(), in_loop] {
+        let said = scene.python(&suite).said().ok();
+        assert!(said.starts_with("conforms: "), "{said}");
+    }
     scene.stop();
 }
 

@@ -1,19 +1,22 @@
 //! One stream and its readers in three languages, killed again and again: a camera in C writes, modules in C, Rust and
 //! Python read in place. Those that are not killed go on, pictures are whole, and accounts balance as in Rust.
 
-use crate::c_modules::{CLASSES, entry, example, seen};
+use crate::c_modules::{CLASSES, compiled, entry, example, said, seen};
 use crate::harness::{OUTPUT, Place, Robot, signal, wait};
-use crate::python_node::package;
+use crate::python_node::{package, repository};
 use nix::sys::signal::Signal;
 use rohrpost::Name;
 use rohrpost::interfaces::CameraInterface;
 use rohrpost_mailbox::{ClassTraffic, Loss, Next, Participant, StreamId, StreamReader};
+use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Reads the camera's pictures in Python.
 const SEER: &str = include_str!("python/seer.py");
+/// Reads them in C.
+const WATCHER: &str = "tests/e2e/c/watcher.c";
 const READERS: [&str; 3] = ["viewer.0", "looker.0", "seer.0"];
 const ALL: [&str; 4] = ["camera.0", "viewer.0", "looker.0", "seer.0"];
 /// Of the camera's pictures.
@@ -46,16 +49,24 @@ fn modules(place: &Place) -> Vec<String> {
         "[classes.seer]\nid = 107\n".into(),
         OUTPUT.into(),
         entry("camera.0", &quoted(&example(place, "camera")), &format!("{RESTART}\n{stream}")),
-        entry("viewer.0", &quoted(&example(place, "viewer")), &reads),
+        entry("viewer.0", &quoted(&compiled(place, &repository().join(WATCHER))), &reads),
         entry("looker.0", &looker, &reads),
         entry("seer.0", &quoted(&seer(place)), &reads),
     ]
 }
 
-/// Reads all that there is; each picture is of one number, as the camera makes them.
-fn read_rest(reader: &mut StreamReader) {
+/// The stream as the test reads it itself.
+struct Own {
+    reader: StreamReader,
+    /// By how much the numbers of pictures are ahead of those of records, modulo 256, in each incarnation of the camera.
+    ahead: BTreeMap<u32, u8>,
+}
+
+/// Reads all that there is. Each picture is whole, of one number, and the one of its record: the camera counts them as
+/// the stream does its records, so that a picture which was not written shows, as what an older one has left.
+fn read_rest(own: &mut Own) {
     loop {
-        match reader.try_next().unwrap() {
+        match own.reader.try_next().unwrap() {
             Next::Nothing => return,
             Next::Lost(_) => {}
             Next::Record(record) => {
@@ -64,6 +75,9 @@ fn read_rest(reader: &mut StreamReader) {
                     let expected = [pixels[0], (index / WIDTH) as u8, (index % WIDTH) as u8];
                     assert_eq!(pixel, expected, "pixel {index} of {:?}", record.info());
                 }
+                let info = record.info();
+                let ahead = pixels[0].wrapping_sub(info.sequence as u8);
+                assert_eq!(*own.ahead.entry(info.incarnation).or_insert(ahead), ahead, "not written: {info:?}");
             }
         }
     }
@@ -81,23 +95,30 @@ fn check_mailboxes(robot: &Robot, deaths: u64) {
 }
 
 /// Each reader sees pictures that it had not seen.
-fn go_on(place: &Place, reader: &mut StreamReader, before: [u64; 3]) {
+fn go_on(place: &Place, own: &mut Own, before: [u64; 3]) {
     for (module, before) in READERS.into_iter().zip(before) {
         wait(format!("{module} sees on"), || {
-            read_rest(reader);
+            read_rest(own);
             (seen(place, module) > before).then_some(())
         });
     }
 }
 
+/// Each restart of the camera shows once at each reader, and nothing else does.
+fn check_jumps(place: &Place, before: [u64; 3], restarts: usize) -> [u64; 3] {
+    let jumps = [0, 1, 2].map(|reader| before[reader] + said(place, READERS[reader], "jumps"));
+    assert!(jumps.iter().all(|jumps| *jumps <= restarts as u64), "{READERS:?}: {jumps:?}, {restarts} restarts");
+    jumps
+}
+
 /// Kills one of them, and only that one is started again.
-fn kill(place: &Place, robot: &Robot, reader: &mut StreamReader, victim: &str) {
+fn kill(place: &Place, robot: &Robot, own: &mut Own, victim: &str) {
     let pids = || ALL.map(|module| (module, robot.pid(module)));
     let others = |pids: [(&'static str, u32); 4]| pids.into_iter().filter(|(module, _)| *module != victim);
     let (before, pid) = (pids(), robot.pid(victim));
     signal(pid, Signal::SIGKILL);
     robot.wait_restarted(victim, pid);
-    go_on(place, reader, READERS.map(|module| if module == victim { 0 } else { seen(place, module) }));
+    go_on(place, own, READERS.map(|module| if module == victim { 0 } else { seen(place, module) }));
     assert!(others(pids()).eq(others(before)), "{:?} were {before:?}", pids());
 }
 
@@ -108,24 +129,31 @@ fn modules_in_c_rust_and_python_are_killed_and_the_others_go_on() {
     let (mut launch, robot) = place.launched(&modules.iter().map(String::as_str).collect::<Vec<_>>());
     let participant = Participant::join(&robot.node, Name::NONE).unwrap();
     let id = StreamId { name: robot.name("camera.0"), number: CameraInterface::IMAGE.number };
-    let mut reader = participant.stream_reader(id).unwrap();
-    let began = reader.position();
-    go_on(&place, &mut reader, [0; 3]);
+    let mut own = Own { reader: participant.stream_reader(id).unwrap(), ahead: BTreeMap::new() };
+    let began = own.reader.position();
+    go_on(&place, &mut own, [0; 3]);
     // One after the other, in another order each time round, and at other moments of their periods.
     let victims: Vec<&str> = (0..kills()).map(|kill| ALL[(kill * 3 + kill / ALL.len()) % ALL.len()]).collect();
+    // What the killed ones had counted.
+    let (mut counted, mut restarts) = ([0; 3], 0);
     for (at, victim) in victims.iter().enumerate() {
         std::thread::sleep(Duration::from_millis(at as u64 * 7 % 50));
-        kill(&place, &robot, &mut reader, victim);
+        let jumps = check_jumps(&place, counted, restarts);
+        if let Some(reader) = READERS.iter().position(|reader| reader == victim) {
+            counted[reader] = jumps[reader];
+        }
+        kill(&place, &robot, &mut own, victim);
+        restarts += usize::from(*victim == "camera.0");
     }
+    check_jumps(&place, counted, restarts);
     place.say(&["stop", "camera.0"]).ok();
-    read_rest(&mut reader);
+    read_rest(&mut own);
     let told = robot.node.inspect_stream(id).unwrap().unwrap();
-    let (read, lost) = reader.accounts();
+    let (read, lost) = own.reader.accounts();
     assert_eq!(read + lost, told.written - began, "{read} read, {lost} lost");
-    let adoptions = victims.iter().filter(|victim| **victim == "camera.0").count();
-    assert_eq!((told.adoptions as usize, told.refused), (adoptions, 0));
+    assert_eq!((told.adoptions as usize, told.refused), (restarts, 0));
     check_mailboxes(&robot, victims.len() as u64);
-    drop((reader, participant, robot));
+    drop((own, participant, robot));
     launch.stop();
     place.assert_empty();
 }

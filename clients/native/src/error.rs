@@ -1,10 +1,11 @@
 //! Why something that a module asked for cannot be had.
 
 use rohrpost_modules::call::CallError;
+use rohrpost_modules::output::plain::line;
 use rohrpost_modules::runtime::{ContextError, StreamReadError};
 use std::io;
 
-/// Why something that a module asked for cannot be had.
+/// Why something that a module asked for cannot be had. Shown, what others wrote in it stays in its line.
 #[derive(Debug, thiserror::Error)]
 pub enum NativeError {
     /// The node, its names, or the module's own streams and data.
@@ -17,7 +18,7 @@ pub enum NativeError {
     #[error(transparent)]
     Read(#[from] StreamReadError),
     /// Another module has no such data.
-    #[error("{module} has no data or stream `{item}`; it has: {known}")]
+    #[error("{} has no data or stream `{}`; it has: {}", line(.module), line(.item), line(.known))]
     NoItem {
         /// The module.
         module: String,
@@ -27,7 +28,7 @@ pub enum NativeError {
         known: String,
     },
     /// It is data, of which nothing but the newest value is kept.
-    #[error("`{item}` of {module} is no stream; follow it as data")]
+    #[error("`{}` of {} is no stream; follow it as data", line(.item), line(.module))]
     NoStream {
         /// The module.
         module: String,
@@ -46,4 +47,20 @@ pub enum NativeError {
     /// A mailbox or timer that following needs.
     #[error("{0}: {1}")]
     System(&'static str, #[source] io::Error),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_others_wrote_stays_in_its_line() {
+        let text = || "a\u{1b}[2J\nb".to_owned();
+        let no_item = NativeError::NoItem { module: text(), item: text(), known: text() };
+        let no_stream = NativeError::NoStream { module: text(), item: text() };
+        for error in [no_item, no_stream] {
+            let shown = error.to_string();
+            assert!(!shown.contains(char::is_control) && shown.contains("a\\u001b[2J\\nb"), "{shown:?}");
+        }
+    }
 }

@@ -33,7 +33,7 @@ impl Peers {
             return Ok(peer.clone());
         }
         let name = context.callee(module)?;
-        let description = describe(context.link(), name, timeout)?;
+        let description = describe(context, name, timeout)?;
         let peer = Rc::new(Peer { name, hash: description.hash(), description });
         self.0.push((module.to_owned(), peer.clone()));
         Ok(peer)
@@ -67,8 +67,8 @@ impl Peer {
     }
 }
 
-/// Asks a module what it offers; each part of the answer must come in time.
-fn describe(link: &Caller, module: Name, timeout: Duration) -> Result<Description, CallError> {
+/// Asks a module what it offers; all parts of the answer must come in time.
+fn describe(context: &Context, module: Name, timeout: Duration) -> Result<Description, CallError> {
     // Of the functions that all modules have no module tells.
     let common = Description {
         name: String::new(),
@@ -77,11 +77,16 @@ fn describe(link: &Caller, module: Name, timeout: Duration) -> Result<Descriptio
         functions: Vec::new(),
         data: Vec::new(),
     };
-    assemble(module, |from| {
+    let link = context.link();
+    // By the clock that a journal keeps: replayed, each part is asked for within the same time.
+    let began = context.now();
+    let elapsed = || Duration::from_nanos(context.now().ns.saturating_sub(began.ns));
+    let ask = |from: u32, left| {
         let mut arguments = Vec::new();
         append(&mut arguments, &from).map_err(|error| CallError::BadArguments(error.to_string()))?;
-        let sequence = link.begin_bytes(module, DESCRIBE, (HASH, &common), timeout, &arguments)?;
+        let sequence = link.begin_bytes(module, DESCRIBE, (HASH, &common), left, &arguments)?;
         let reply = link.wait_bytes(sequence, module)?;
         from_bytes(&reply).map_err(|error| CallError::BadReply(module, error.to_string()))
-    })
+    };
+    assemble(module, timeout, elapsed, ask)
 }

@@ -28,6 +28,8 @@ def _require_rust() -> None:
     root = _FOLDER.parent.parent
     if not (root / "clients" / "native" / "Cargo.toml").is_file():
         missing = f"{root} is no copy of the repository of Rohrpost, of which it is a part"
+    elif sysconfig.get_config_var("Py_GIL_DISABLED"):
+        missing = "this interpreter is free-threaded, and its wheels are for those with a lock; take one without `t`"
     elif shutil.which("cargo") is None:
         missing = "there is no `cargo` in PATH; install Rust (https://rustup.rs)"
     else:

@@ -36,6 +36,9 @@ class Builds(unittest.TestCase):
                 for hook in (build.get_requires_for_build_wheel, lambda: build.build_wheel("/nowhere")):
                     with self.assertRaisesRegex(RuntimeError, "/ is no copy of the repository"):
                         hook()
+            with mock.patch.object(build.sysconfig, "get_config_var", return_value=1):
+                with self.assertRaisesRegex(RuntimeError, "is free-threaded.* set ROHRPOST_PURE=1"):
+                    build.get_requires_for_build_wheel()
             with mock.patch.object(build.shutil, "which", return_value="/bin/cargo"):
                 self.assertRegex(build.get_requires_for_build_wheel()[0], "^maturin")
         for platform, pure in (("linux", "1"), ("darwin", "")):

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import socket
-import subprocess
-import sys
 import threading
 import time
 import unittest
@@ -17,7 +14,6 @@ import rohrpost as rp
 from rohrpost import remote
 from rohrpost.common import SetParameters, type_of_class
 from rohrpost.faults import ARGUMENTS, INTERFACE_DIFFERS, INTERRUPTED, MODULE_ERROR, MODULE_OFF
-from rohrpost.remote import aio
 from rohrpost.remote.parameters import _SET
 from rohrpost.schema import decode, encode
 
@@ -37,6 +33,9 @@ def wait(is_so: Callable[[], Any]) -> Any:
 
 
 class Clients(unittest.TestCase):
+    connect: Callable[..., Any] = staticmethod(remote.connect)
+    """The client under test; :mod:`.test_aio` has the other one."""
+
     def setUp(self) -> None:
         self.server = Server()
         self.addCleanup(self.server.close)
@@ -46,9 +45,13 @@ class Clients(unittest.TestCase):
         self.client = self.connected("tool.1")
 
     def connected(self, own: str, **how: Any) -> remote.Client:
-        client = remote.connect(self.server.address, own, INSTALLATION, timeout_s=20, **how)
+        client: remote.Client = self.connect(self.server.address, own, INSTALLATION, timeout_s=20, **how)
         self.addCleanup(client.close)
         return client
+
+    def by_the_host(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """A function of the hosted module, to be called from here."""
+        return function
 
     def call(self, function: str, *values: Any) -> Any:
         return self.client.call("probe.0", function, *values, timeout_s=20)
@@ -91,6 +94,42 @@ class Clients(unittest.TestCase):
             wait(kept.is_set)
             wait(lambda: self.host._core.session.is_up)
         self.assertEqual(self.call("count", 2), 2)
+
+    def test_what_fails_when_it_is_due_costs_a_connection_and_no_client(self) -> None:
+        def failing_once(works: Any) -> Any:
+            has_failed: list[bool] = []
+
+            def fails(*values: Any) -> Any:
+                if not has_failed:
+                    has_failed.append(True)
+                    raise ZeroDivisionError("unforeseen")
+                return works(*values)
+
+            return fails
+
+        core = self.host._core
+        for of, name in [(core.own.caller, "poll"), (core.session, "ready")]:
+            before = self.host.connections
+            with self.assertLogs("rohrpost", "ERROR"):
+                setattr(of, name, failing_once(getattr(of, name)))
+                wait(lambda: self.host.connections > before and self.host.is_up)
+        self.assertEqual(self.call("count", 2), 2)
+
+    def test_the_reason_of_such_a_failure_is_told_and_it_is_tried_again_with_pauses(self) -> None:
+        core, polls = self.client._core, 0
+
+        def fails(now_ns: int) -> int | None:
+            nonlocal polls
+            polls += 1
+            raise ZeroDivisionError("unforeseen")
+
+        with self.assertLogs("rohrpost", "ERROR"):
+            core.own.caller.poll = fails  # type: ignore[method-assign]
+            wait(lambda: "what is due cannot be done: ZeroDivisionError: unforeseen" in self.client.words)
+            # One that fails without a connection, too, is no loop without a pause.
+            until_ns = time.monotonic_ns() + 300_000_000
+            wait(lambda: time.monotonic_ns() > until_ns)
+        self.assertLess(polls, 20)
 
     def test_what_is_lost_or_doubled_on_the_way_runs_once(self) -> None:
         turn = iter(range(10**9))
@@ -181,14 +220,34 @@ class Clients(unittest.TestCase):
             wait(lambda: self.client.connections > 1 and self.host.connections > 1)
             before = self.call("count", 7)
             wait(lambda: beats.next(20).value == before)
-        self.probe.publish("word", "hello", 123)
+
+    def test_what_is_closed_ends_there_and_here(self) -> None:
+        def subscribers() -> int:
+            count: int = self.client.status("probe.0", 20).subscribers
+            return count
+
+        with self.client.subscribe("probe.0", "beat") as beats:
+            beats.next(20)
+            self.assertEqual(subscribers(), 1)
+        wait(lambda: subscribers() == 0)
+        beats.close()
+        with self.assertRaisesRegex(rp.Misuse, "this subscription is closed"):
+            while True:
+                beats.next(20)
+        self.client.close()
+        beats.close()
+
+    def test_what_a_module_publishes_itself_is_its_newest_data(self) -> None:
+        publish = self.by_the_host(self.probe.publish)
+        publish("word", "hello", 123)
         self.assertEqual(self.client.get("probe.0", "word", 20), (123, "hello"))
-        with self.assertRaisesRegex(rp.Misuse, "Probe has no data `text`; it has: beat, word"):
-            self.probe.publish("text", "")
-        with self.assertRaisesRegex(rp.Misuse, "value: expected text, got `5`"):
-            self.probe.publish("word", 5)
-        with self.assertRaisesRegex(rp.Misuse, "Probe.word: 70003 bytes"):
-            self.probe.publish("word", "x" * 70_000)
+        for data, value, why in [
+            ("text", "", "Probe has no data `text`; it has: beat, word"),
+            ("word", 5, "value: expected text, got `5`"),
+            ("word", "x" * 70_000, "Probe.word: 70003 bytes"),
+        ]:
+            with self.assertRaisesRegex(rp.Misuse, why):
+                publish(data, value)
 
     def test_a_module_that_was_replaced_by_one_with_another_interface_is_asked_anew(self) -> None:
         class First(rp.Module, klass="probe"):
@@ -268,21 +327,19 @@ class Clients(unittest.TestCase):
         address = f"127.0.0.1:{free.getsockname()[1]}"
         free.close()
         with self.assertRaisesRegex(rp.NoConnection, f"the TCP router at {address} is not reached"):
-            remote.connect(address, "tool.1", INSTALLATION, timeout_s=1)
+            self.connect(address, "tool.1", INSTALLATION, timeout_s=1)
         nowhere = "x" * 64 + ".invalid:1"
         with self.assertRaisesRegex(rp.NoConnection, "is not reached: .*label"):
-            remote.connect(nowhere, "tool.1", INSTALLATION, timeout_s=1)
-        with self.assertRaisesRegex(rp.NoConnection, "is not reached: .*label"):
-            asyncio.run(aio.connect(nowhere, "tool.1", INSTALLATION, timeout_s=1))
-        with remote.connect(address, "tool.1", INSTALLATION, timeout_s=0) as ends:
+            self.connect(nowhere, "tool.1", INSTALLATION, timeout_s=1)
+        with self.connect(address, "tool.1", INSTALLATION, timeout_s=0) as ends:
             threading.Timer(0.1, ends.close).start()
             with self.assertRaisesRegex(rp.Misuse, "this client is closed"):
                 ends.wait_until_up(20)
         other = remote.Installation(7, {"tool": 16}, 8, 1)
         with self.assertRaisesRegex(rp.NoConnection, "the common digest here is 0000000000000008"):
-            remote.connect(self.server.address, "tool.1", other, timeout_s=1)
+            self.connect(self.server.address, "tool.1", other, timeout_s=1)
         with self.assertRaisesRegex(rp.NoConnection, "there is no .*ca.pem"):
-            remote.connect(self.server.address, "tool.1", INSTALLATION, tls=remote.Tls("nowhere", "x"))
+            self.connect(self.server.address, "tool.1", INSTALLATION, tls=remote.Tls("nowhere", "x"))
         with self.assertRaisesRegex(rp.BadName, "no class `motor` is known here; there are: probe, tool"):
             self.client.proxy("motor.0")
         with self.assertRaisesRegex(rp.Misuse, "is not of this client's system"):
@@ -305,112 +362,6 @@ class Clients(unittest.TestCase):
         self.assertEqual(self.probe.gain, 3)
         with self.assertRaisesRegex(rp.Misuse, "Probe.gain: 10 is not in its range, 1..=9"):
             self.probe.gain = 10
-
-    def test_asyncio_speaks_over_the_same_core(self) -> None:
-        class Twice(rp.Module, klass="probe"):
-            @rp.command(16)
-            async def twice(self, by: rp.U32) -> rp.U64:
-                counted: int = await self.proxy("probe.0").count(by)
-                return 2 * counted
-
-            @rp.data_out(1, rate_hz=50)
-            async def beat(self) -> int:
-                return 5
-
-        async def main() -> None:
-            server = self.server.address
-            async with await aio.connect(server, "tool.8", INSTALLATION, timeout_s=20, big_endian=True) as client:
-                client.host("probe.2", Twice())
-                counted = await asyncio.gather(*(client.call("probe.0", "count", 1, timeout_s=20) for _ in range(8)))
-                self.assertEqual(sorted(counted), [1, 2, 3, 4, 5, 6, 7, 8])
-                async with await aio.connect(server, "tool.9", INSTALLATION, timeout_s=20) as other:
-                    self.assertEqual(await other.proxy("probe.2", 20).twice(2), 20)
-                    async with other.subscribe("probe.2", "beat") as beats:
-                        self.assertEqual([(await beats.next(20)).value for _ in range(3)], [5, 5, 5])
-                        await asyncio.to_thread(self.server.drop_all)
-                        while other._core.session.connections < 2 or not other.is_up:
-                            await asyncio.sleep(0.01)
-                        self.assertEqual((await beats.next(20)).value, 5)
-                with self.assertRaises(rp.CallTimeout):
-                    await client.status("probe.9", timeout_s=0.2)
-
-                def elsewhere() -> None:
-                    asyncio.run(client.status("probe.0"))
-
-                with self.assertRaisesRegex(rp.Misuse, "belongs to another event loop"):
-                    await asyncio.to_thread(elsewhere)
-            with self.assertRaisesRegex(rp.Misuse, "this client is closed"):
-                await client.status("probe.0")
-
-        asyncio.run(main())
-
-    def test_what_leaves_or_cancels_itself_is_a_module_in_error(self) -> None:
-        class Odd:
-            def __repr__(self) -> str:
-                raise KeyError("odd")
-
-        class Leaves(rp.Module, klass="probe"):
-            @rp.command(16)
-            def leave(self) -> None:
-                sys.exit(3)
-
-            @rp.command(17)
-            def odd(self) -> rp.Pose:
-                return Odd()  # type: ignore[return-value]
-
-        class AsyncLeaves(Leaves, klass="probe"):
-            @rp.command(18)
-            async def cancel(self) -> None:
-                task = asyncio.get_running_loop().create_task(asyncio.sleep(20))
-                task.cancel()
-                await task
-
-            @rp.command(19)
-            async def go(self) -> None:
-                sys.exit(4)
-
-            @rp.command(20)
-            async def hang(self) -> None:
-                await asyncio.sleep(60)
-
-        async def hosted_in_a_loop() -> None:
-            async with await aio.connect(self.server.address, "tool.8", INSTALLATION, timeout_s=20) as client:
-                client.host("probe.2", AsyncLeaves())
-                for function, why in {**told, "cancel": "CancelledError", "go": "SystemExit: 4"}.items():
-                    with self.assertRaisesRegex(rp.CallFault, f"the module is in error: {why}"):
-                        await client.call("probe.2", function, timeout_s=20)
-                    for on in (False, True):
-                        await client.switch("probe.2", on, 20)
-                with self.assertRaises(rp.CallTimeout):
-                    await client.call("probe.2", "hang", timeout_s=0.1)
-            # Its own end is no failure, and waits for nobody.
-
-        told = {"leave": "SystemExit: 3", "odd": "RuntimeError: what it returns cannot be told: KeyError"}
-        self.host.host("probe.1", Leaves())
-        for function, why in told.items():
-            with self.assertRaisesRegex(rp.CallFault, f"the module is in error: {why}"):
-                self.client.call("probe.1", function, timeout_s=5)
-            for on in (False, True):
-                self.client.switch("probe.1", on, 20)
-        asyncio.run(hosted_in_a_loop())
-
-    def test_both_clients_have_the_same_methods_and_each_has_a_text(self) -> None:
-        def public(cls: type) -> dict[str, Any]:
-            return {name: getattr(cls, name) for name in dir(cls) if not name.startswith("_")}
-
-        both = public(remote.Client), public(aio.AsyncClient)
-        self.assertEqual(both[0].keys(), both[1].keys())
-        for name in both[0]:
-            self.assertTrue(all(cls[name].__doc__ for cls in both), name)
-
-    def test_an_interpreter_ends_with_a_client_open(self) -> None:
-        code = (
-            "from rohrpost import remote\n"
-            "it = remote.Installation(7, {'tool': 16}, 7, 1)\n"
-            f"client = remote.connect('{self.server.address}', 'tool.3', it, timeout_s=20)\n"
-        )
-        said = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True, timeout=60)
-        self.assertEqual((said.returncode, said.stderr), (0, ""))
 
 
 if __name__ == "__main__":

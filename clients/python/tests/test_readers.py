@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import dataclasses
 import json
@@ -9,6 +10,7 @@ import pathlib
 import pickle
 import random
 import unittest
+import unittest.mock
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -17,7 +19,8 @@ from rohrpost.annotations import type_of
 from rohrpost.schema import WalkError, encode, to_json, type_from_bytes
 from rohrpost.schema.decode import Decoder, decode
 from rohrpost.schema.encode import _Encoder
-from rohrpost.schema.readers import READERS, Unread, reader_of
+from rohrpost.schema.readers import READERS, reader_of
+from rohrpost.schema.scalars import Unread
 from rohrpost.schema.tree import (
     BOOL, BYTES, CHAR, EMPTY_MAX, F32, F64, TEXT, U8, U32, UNIT, Array, Enum, Field, List, Map, Named, Option, Plain,
     Struct, Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
@@ -201,6 +204,40 @@ class Readers(unittest.TestCase):
             at = chance.randrange(len(data))
             yield data[:at] + bytes([chance.choice((0, 1, 0x7F, 0x80, 0xFF, chance.randrange(256)))]) + data[at + 1 :]
             yield data[:at] + b"\xff" * chance.randrange(12) + data[at:]
+
+    def test_a_message_has_a_bounded_number_of_values(self) -> None:
+        """Refused before they are made, by what reads a type the first time as by what reads it then."""
+        small = Struct(Named("Small", 3, (Field("a", U8),)))
+        many = bytes([0xFF, 0xFF, 0xFF, 0x1F])  # 64 Mi of them
+        limit = r"more than 1000000 values in one; send many numbers as bytes, or as lists of f32 or f64"
+        cases: list[tuple[Type, bytes, str]] = [
+            (List(small), many + bytes(1 << 26), ""),
+            (Struct(Named("S", 3, (Field("of", Map(U8, U8)),))), many + bytes(1 << 26), r"of\[\d+\]: "),
+            (Array(1_000_000, U8), bytes(1_000_000), ""),
+            (Array(2, Array(500_000, U8)), bytes(1_000_000), r"\[1\]: "),
+        ]
+        for type, data, where in cases:
+            for _ in range(3):
+                with self.assertRaisesRegex(WalkError, f"^{where}{limit}"):
+                    decode(type, data)
+        for _ in range(3):
+            self.assertEqual(len(decode(BYTES, many + bytes(0x3FFFFFF))), 0x3FFFFFF)
+            self.assertEqual(len(decode(List(F32), b"\xc0\x84\x3d" + bytes(4_000_000))), 1_000_000)
+
+    def test_both_count_values_alike(self) -> None:
+        chance, refused, read = random.Random(5), 0, 0
+        with contextlib.ExitStack() as stack:
+            for module in ("decode", "readers"):
+                stack.enter_context(unittest.mock.patch(f"rohrpost.schema.{module}.VALUES_MAX", 6))
+            # Copies have no reader of before, which has another limit.
+            for type in map(copy.deepcopy, types(chance)):
+                for _ in range(6):
+                    data = encode(type, any_value(chance, type))
+                    said = outcome(lambda: walked(type, data))
+                    refused += "more than 6 values" in said
+                    read += "WalkError" not in said
+                    self.assertEqual(outcome(lambda: decode(type, data)), said, f"{type} of {data.hex()}")
+        self.assertTrue(min(refused, read) > 100, f"{refused} refused, {read} read")
 
     def test_both_write_the_same_and_say_the_same_of_what_does_not_fit(self) -> None:
         chance = random.Random(4)

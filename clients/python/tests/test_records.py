@@ -11,7 +11,8 @@ import rohrpost as rp
 from rohrpost import remote
 from rohrpost.names import Name
 from rohrpost.remote.frames import BadFrame, DescribedPart, RecordPart, Splitter
-from rohrpost.remote.records import Assembly, RecordQueue
+from rohrpost.remote.handed_out import RecordQueue
+from rohrpost.remote.records import Assembly
 from rohrpost.schema import DataItem, Description, Field
 from rohrpost.schema.tree import BYTES, U32
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
 import unittest
 import zlib
+from collections.abc import Callable
 from typing import Any
 
 import rohrpost as rp
 from rohrpost import remote
 from rohrpost.names import Name
-from rohrpost.remote import aio
 from rohrpost.remote.streams import BeyondNode, BeyondStream, BeyondStreams
 from rohrpost.schema import DataItem, Description, Field
 from rohrpost.schema.encode import encode
@@ -65,6 +64,9 @@ class Looker(rp.Module, klass="probe"):
 
 
 class Streams(unittest.TestCase):
+    connect: Callable[..., Any] = staticmethod(remote.connect)
+    """The client under test; :mod:`.test_aio` has the other one."""
+
     def setUp(self) -> None:
         self.server = Server()
         self.server.router.is_strict = True
@@ -73,7 +75,7 @@ class Streams(unittest.TestCase):
         self.host.host("tcp.255", TcpRouter())
 
     def connected(self, own: str, label: str = LABEL) -> remote.Client:
-        client = remote.connect(self.server.address, own, ROBOT, timeout_s=20, label=label)
+        client: remote.Client = self.connect(self.server.address, own, ROBOT, timeout_s=20, label=label)
         self.addCleanup(client.close)
         return client
 
@@ -177,7 +179,7 @@ class Streams(unittest.TestCase):
             with self.assertRaisesRegex(rp.Misuse, why):
                 self.connected("tool.3", label=label).stream("camera.0", "image")
         robot = remote.Installation(7, {"camera": 112, "tool": 16}, 7, 1)
-        with remote.connect(self.server.address, "tool.4", robot, label=LABEL, timeout_s=20) as other:
+        with self.connect(self.server.address, "tool.4", robot, label=LABEL, timeout_s=20) as other:
             with self.assertRaisesRegex(rp.Misuse, "the id of class `tcp` must be known"):
                 other.stream("camera.0", "image")
 
@@ -216,31 +218,6 @@ class Streams(unittest.TestCase):
         for _ in range(2):
             with self.assertRaisesRegex(rp.Misuse, "does not say which one it is on"):
                 client.host("probe.0", looker)
-
-    def test_asyncio_reads_the_same(self) -> None:
-        async def main() -> None:
-            async with await aio.connect(self.server.address, "tool.1", ROBOT, label=LABEL, timeout_s=20) as client:
-                async with client.stream("camera.0", "count", room=8) as counts:
-                    await asyncio.to_thread(self.describe, 4)
-                    for number in (1, 2, 4):
-                        self.count(number)
-                    self.assertEqual([(await counts.next(20)).value for _ in range(3)], [1, 2, 4])
-                    self.assertEqual((await counts.newest(20)).value, 4)
-                    self.assertEqual(counts.missed, remote.Missed(lost=1))
-                    with self.assertRaisesRegex(TimeoutError, "no record came within 0.1 s"):
-                        await counts.next(0.1)
-                began = time.monotonic()
-                with self.assertRaises(remote.NoSuchStream):
-                    await client.stream("camera.0", "other").newest(PATIENCE_S)
-                self.assertLess(time.monotonic() - began, PATIENCE_S)
-                looker = Looker()
-                client.host("probe.0", looker)
-                await asyncio.to_thread(self.describe, 3)
-                await asyncio.to_thread(self.picture, 1)
-                while not looker.seen:
-                    await asyncio.sleep(0.01)
-
-        asyncio.run(main())
 
 
 if __name__ == "__main__":

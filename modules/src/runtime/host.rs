@@ -16,7 +16,7 @@ use rohrpost_mailbox::{
 };
 use rohrpost_schema::{Data, Description};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Packages of subscribed data that may wait for a tool.
 const DATA_SLOTS: u16 = 128;
@@ -261,13 +261,15 @@ impl ToolLink {
     }
 }
 
-/// Asks a module what it offers; each part of the answer must come within `timeout`.
+/// Asks a module what it offers; all parts of the answer must come within `timeout`.
 ///
 /// # Errors
 /// See [`CallError`].
 pub fn describe(link: &mut Link, module: Name, timeout: Duration) -> Result<Description, CallError> {
-    assemble(module, |from| {
-        let call = link.begin(module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))?;
+    let began = Instant::now();
+    let ask = |from: u32, left| {
+        let call = link.begin(module, common::DESCRIBE, common::HASH, left, |body| append(body, &(from,)))?;
         link.wait(call, |reply| postcard::from_bytes(reply))
-    })
+    };
+    assemble(module, timeout, || began.elapsed(), ask)
 }

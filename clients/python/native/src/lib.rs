@@ -20,8 +20,8 @@ mod watching;
 
 use pyo3::prelude::*;
 
-/// `rohrpost._node`; its types are in `_node.pyi`.
-#[pymodule]
+/// `rohrpost._node`; its types are in `_node.pyi`. A free-threaded interpreter that loads it turns its lock on.
+#[pymodule(gil_used = true)]
 mod _node {
     #[pymodule_export]
     use crate::bridge::run;

@@ -34,7 +34,6 @@ from .clock import passed_ns
 from .core import Endpoint, broken, not_connected
 from .session import Settings, Step
 from .shell import Shell, documented_like
-from .streams import Wanted
 from .timing import SystemTime
 from .transport import Plain, Sealed, Tls, Transport
 
@@ -204,11 +203,7 @@ class AsyncClient(Shell):
     ) -> AsyncSubscription:
         self._check()
         subscription = AsyncSubscription(self, 1 if newest else room)
-        self._core.now_ns = passed_ns()
-        subscription._following = self._core.follow(
-            self._core.own, self.name(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
-            subscription._take, subscription._said,
-        )  # fmt: skip
+        self._follow(subscription, name, data, period_s, newest, expected)
         self._soon()
         return subscription
 
@@ -223,11 +218,7 @@ class AsyncClient(Shell):
     ) -> AsyncRecordStream:
         self._check()
         reading = AsyncRecordStream(self, room)
-        type = calling.expected_type(expected)
-        wanted = Wanted(self.name(name), stream, type, most_bytes, reading._take, reading._said)
-        self._core.streams.add(passed_ns(), wanted)
-        reading._wanted = wanted
-        reading._takes_from(wanted.assembly)
+        self._read_records(reading, name, stream, expected, most_bytes)
         self._soon()
         return reading
 
@@ -262,7 +253,9 @@ class AsyncClient(Shell):
                 if line is not None:
                     line.drop()
                 line = self._line = None
-            elif step is Step.WRITE and line is not None and line.write():
+                if self._connecting is not None:
+                    self._connecting.cancel()
+            elif step is Step.WRITE and line is not None and line.writes():
                 continue
             break
         wait_ns = until_ns - passed_ns() if step is Step.WAIT else 100_000_000 if step is Step.WRITE else 0
@@ -315,8 +308,16 @@ class _Line(asyncio.Protocol):
         self._is_paused = False
         self._client._soon()
 
-    def write(self) -> bool:
+    def writes(self) -> bool:
         """Writes what is ready; whether the stream takes more."""
+        try:
+            return self._write()
+        except Exception as error:  # As for what comes.
+            self.drop()
+            self._client._broken(self, broken(error, "what is ready cannot be sent"))
+            return False
+
+    def _write(self) -> bool:
         if self._is_paused or not self.transport.is_ready:
             return False
         session = self._client._core.session

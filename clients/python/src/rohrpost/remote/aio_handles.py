@@ -4,142 +4,68 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..errors import Misuse, RohrpostError
 from ..interface import Module
 from ..names import Name
-from ..schema.tree import Type
 from .clock import passed_ns
-from .core import Endpoint
-from .following import Data, Following
-from .records import Record, RecordQueue
-from .streams import NoSuchStream, Wanted
+from .following import Data
+from .handed_out import DataQueue, Functions, RecordQueue
+from .handles import RecordStream, Subscription
+from .records import Record
+from .shell import documented_like
+from .streams import NoSuchStream
 
 if TYPE_CHECKING:
     from .aio import AsyncClient
 
+T = TypeVar("T")
+H = TypeVar("H", bound="_AsyncHandle[Any]")
 
-class AsyncProxy:
+
+class AsyncProxy(Functions):
     """The functions of a module as coroutines, by its own description."""
 
-    def __init__(self, client: AsyncClient, endpoint: Endpoint, to: Name, timeout_s: float) -> None:
-        self._client, self._endpoint, self._to, self._timeout_s = client, endpoint, to, timeout_s
 
-    def __getattr__(self, function: str) -> Callable[..., Awaitable[Any]]:
-        if function.startswith("__"):
-            raise AttributeError(function)
+class _AsyncHandle(Generic[T]):
+    """Something to be waited for, until ``close``, the end of ``async with``, or that of its client."""
 
-        def call(*values: Any, **named: Any) -> Awaitable[Any]:
-            return self._client._call_by_name(self._endpoint, self._to, function, values, named, self._timeout_s)
+    _kind, _content = "", ""
+    problem: RohrpostError | None
 
-        return call
-
-
-class AsyncSubscription:
-    """Data of a module as they come: ``async for data in subscription``, or :meth:`next`. Ended by ``close``, or at the
-    end of ``async with``."""
-
-    _following: Following
-
-    def __init__(self, client: AsyncClient, room: int) -> None:
-        self._client = client
-        self._values: deque[Data] = deque(maxlen=max(1, room))
-        self._is_closed = False
-        self.problem: RohrpostError | None = None
-        """What is wrong at present, if anything is; it goes on trying."""
-        self.dropped = 0
-        """Values that gave way here, since nobody took them."""
-
-    @property
-    def lost(self) -> int:
-        """Values that should have come and did not."""
-        return self._following.lost
-
-    @property
-    def type(self) -> Type | None:
-        """The type of the values, once the module has described itself."""
-        return self._following.type
-
-    def _take(self, data: Data) -> None:
-        self.dropped += len(self._values) == self._values.maxlen
-        self._values.append(data)
-
-    def _said(self, problem: RohrpostError | None) -> None:
-        self.problem = problem
-
-    async def next(self, timeout_s: float | None = None) -> Data:
-        """The next value. Raises what is in the way, or :class:`TimeoutError`, if none comes in time."""
-        self._client._check()
-        try:
-            await asyncio.wait_for(self._client._until(lambda: self._values or self._is_closed), timeout_s)
-        except asyncio.TimeoutError:
-            raise self.problem or TimeoutError(f"no data came within {timeout_s} s") from None
-        if not self._values:
-            raise Misuse("this subscription is closed")
-        return self._values.popleft()
-
-    async def __aiter__(self) -> AsyncIterator[Data]:
-        while not self._is_closed:
-            yield await self.next()
-
-    async def __aenter__(self) -> AsyncSubscription:
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Ends it."""
-        if not self._is_closed and not self._client._is_closed:
-            self._is_closed = True
-            self._client._core.now_ns = passed_ns()
-            self._client._core.unfollow(self._client._core.own, self._following)
-            self._client._soon()
-
-
-class AsyncRecordStream(RecordQueue):
-    """A stream of a module, record by record: ``async for record in stream``, :meth:`next` or :meth:`newest`, as
-    :class:`rohrpost.remote.RecordStream` has them. Ended by ``close``, or at the end of ``async with``."""
-
-    _wanted: Wanted
-
-    def __init__(self, client: AsyncClient, room: int) -> None:
-        super().__init__(room)
+    def __init__(self, client: AsyncClient) -> None:
         self._client = client
         self._is_closed = False
 
-    async def next(self, timeout_s: float | None = None) -> Record:
-        """The next record that was not taken yet."""
-        return await self._wait(False, timeout_s)
-
-    async def newest(self, timeout_s: float | None = None) -> Record:
-        """The newest record that came."""
-        return await self._wait(True, timeout_s)
-
-    async def _wait(self, newest: bool, timeout_s: float | None) -> Record:
+    async def _next(self, is_there: Callable[[], Any], take: Callable[[], T], timeout_s: float | None) -> T:
         self._client._check()
 
         def is_over() -> bool:
-            return self._has(newest) or self._is_closed or isinstance(self.problem, NoSuchStream)
+            return self._is_closed or isinstance(self.problem, NoSuchStream)
 
         try:
-            await asyncio.wait_for(self._client._until(is_over), timeout_s)
+            await asyncio.wait_for(self._client._until(lambda: is_there() or is_over()), timeout_s)
         except asyncio.TimeoutError:
-            raise self.problem or TimeoutError(f"no record came within {timeout_s} s") from None
-        if self._has(newest):
-            return self._taken(newest)
+            raise self.problem or TimeoutError(f"no {self._content} came within {timeout_s} s") from None
+        if is_there():
+            return take()
         if self._is_closed or self._client._is_closed or self.problem is None:
-            raise Misuse("this stream is closed")
+            raise Misuse(f"this {self._kind} is closed")
         raise self.problem
 
-    async def __aiter__(self) -> AsyncIterator[Record]:
+    async def next(self, timeout_s: float | None = None) -> T:
+        raise NotImplementedError
+
+    def _end(self, now_ns: int) -> None:
+        raise NotImplementedError
+
+    async def __aiter__(self) -> AsyncIterator[T]:
         while not self._is_closed:
             yield await self.next()
 
-    async def __aenter__(self) -> AsyncRecordStream:
+    async def __aenter__(self: H) -> H:
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -149,8 +75,47 @@ class AsyncRecordStream(RecordQueue):
         """Ends it."""
         if not self._is_closed and not self._client._is_closed:
             self._is_closed = True
-            self._client._core.streams.remove(passed_ns(), self._wanted)
+            self._end(passed_ns())
             self._client._soon()
+
+
+@documented_like(Subscription)
+class AsyncSubscription(_AsyncHandle[Data], DataQueue):
+    """Data of a module as they come: ``async for data in subscription``, or :meth:`next`. Ended by ``close``, or at the
+    end of ``async with``."""
+
+    _kind, _content = "subscription", "data"
+
+    def __init__(self, client: AsyncClient, room: int) -> None:
+        _AsyncHandle.__init__(self, client)
+        DataQueue.__init__(self, room)
+
+    async def next(self, timeout_s: float | None = None) -> Data:
+        return await self._next(lambda: self._values, self._values.popleft, timeout_s)
+
+    def _end(self, now_ns: int) -> None:
+        self._client._unfollow(now_ns, self)
+
+
+@documented_like(RecordStream)
+class AsyncRecordStream(_AsyncHandle[Record], RecordQueue):
+    """A stream of a module, record by record: ``async for record in stream``, :meth:`next` or :meth:`newest`. Ended by
+    ``close``, or at the end of ``async with``."""
+
+    _kind, _content = "stream", "record"
+
+    def __init__(self, client: AsyncClient, room: int) -> None:
+        _AsyncHandle.__init__(self, client)
+        RecordQueue.__init__(self, room)
+
+    async def next(self, timeout_s: float | None = None) -> Record:
+        return await self._next(lambda: self._has(False), lambda: self._taken(False), timeout_s)
+
+    async def newest(self, timeout_s: float | None = None) -> Record:
+        return await self._next(lambda: self._has(True), lambda: self._taken(True), timeout_s)
+
+    def _end(self, now_ns: int) -> None:
+        self._client._unread(now_ns, self)
 
 
 class ModuleHost:

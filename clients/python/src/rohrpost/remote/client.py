@@ -29,7 +29,6 @@ from .handles import ModuleHost, Proxy, RecordStream, Subscription
 from .line import Ears, Line, Waiting
 from .session import Settings, Step
 from .shell import Shell
-from .streams import Wanted
 from .timing import SystemTime
 from .transport import Plain, Sealed
 
@@ -207,11 +206,7 @@ class Client(Shell):
         """
         subscription = Subscription(self, 1 if newest else room)
         with self._locked():
-            self._core.now_ns = passed_ns()
-            subscription._following = self._core.follow(
-                self._core.own, self.name(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
-                subscription._take, subscription._said,
-            )  # fmt: skip
+            self._follow(subscription, name, data, period_s, newest, expected)
         self._wake()
         return subscription
 
@@ -231,12 +226,8 @@ class Client(Shell):
         ``rohrpost.Image``. Records of more than ``most_bytes`` are not taken.
         """
         reading = RecordStream(self, room)
-        type = calling.expected_type(expected)
-        wanted = Wanted(self.name(name), stream, type, most_bytes, reading._take, reading._said)
         with self._locked():
-            self._core.streams.add(passed_ns(), wanted)
-        reading._wanted = wanted
-        reading._takes_from(wanted.assembly)
+            self._read_records(reading, name, stream, expected, most_bytes)
         self._wake()
         return reading
 
@@ -322,13 +313,13 @@ class Client(Shell):
                     step, until_ns = self._core.poll(now_ns)
                     self._rests_until_ns = min(until_ns, now_ns + _REST_NS) if step is Step.WAIT else now_ns + _REST_NS
                     self._lock.notify_all()
-                if step is Step.CONNECT:
-                    self._connect()
-                elif step is Step.CLOSE:
+                try:
+                    self._do(step)
+                except Exception as error:  # Nothing may end this thread, and with it all that is hosted here.
+                    why = broken(error)
                     with self._lock:
+                        self._core.session.closed(passed_ns(), why)
                         self._ears.drop()
-                else:
-                    self._turn(step)
         finally:
             with self._lock:
                 # However it ends, nobody waits for it any more.
@@ -336,6 +327,15 @@ class Client(Shell):
                 self._core.close("this client is closed")
                 self._lock.notify_all()
                 self._ears.close()
+
+    def _do(self, step: Step) -> None:
+        if step is Step.CONNECT:
+            self._connect()
+        elif step is Step.CLOSE:
+            with self._lock:
+                self._ears.drop()
+        else:
+            self._turn(step)
 
     def _connect(self) -> None:
         why = ""
@@ -353,25 +353,19 @@ class Client(Shell):
             self._ears.line = Line(stream, Plain() if self._context is None else Sealed(self._context))
 
     def _turn(self, step: Step) -> None:
-        try:
+        with self._lock:
+            line, now_ns = self._ears.line, passed_ns()
+            if line is not None:
+                self._write_all(line)
+            takes_more = line is not None and line.transport.is_ready and not line.transport.pending()
+            # A stream that takes nothing now, or is not sealed yet, is looked at again when something comes.
+            if step is not Step.WAIT:
+                self._rests_until_ns = now_ns + (0 if takes_more else _BLOCKED_NS)
+            rest_ns = self._rests_until_ns - now_ns
+        if self._ears.select(max(0, rest_ns) / 1e9):
             with self._lock:
-                line, now_ns = self._ears.line, passed_ns()
                 if line is not None:
-                    self._write_all(line)
-                takes_more = line is not None and line.transport.is_ready and not line.transport.pending()
-                # A stream that takes nothing now, or is not sealed yet, is looked at again when something comes.
-                if step is not Step.WAIT:
-                    self._rests_until_ns = now_ns + (0 if takes_more else _BLOCKED_NS)
-                rest_ns = self._rests_until_ns - now_ns
-            if self._ears.select(max(0, rest_ns) / 1e9):
-                with self._lock:
-                    if line is not None:
-                        self._read(line)
-        except Exception as error:  # Nothing that comes may end this thread, and with it all that is hosted here.
-            why = broken(error)
-            with self._lock:
-                self._core.session.closed(passed_ns(), why)
-                self._ears.drop()
+                    self._read(line)
 
     def _write_all(self, line: Line) -> None:
         if line.broken is not None:

@@ -30,6 +30,8 @@ from .timing import SystemTime
 from .work import WorkQueue
 
 _HOSTED_MAX = 64
+_REST_NS = 1_000_000_000
+"""What fails without a connection, too, is tried again after so long."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -146,7 +148,16 @@ class Core:
     # The stream.
 
     def poll(self, now_ns: int) -> tuple[Step, int]:
-        """What the shell does next; when it is to wait, until when, ns."""
+        """What the shell does next; when it is to wait, until when, ns. A failure in here is a mistake of this package:
+        it costs the connection, which is made anew, and not the shell with all that it hosts."""
+        try:
+            return self._polled(now_ns)
+        except Exception as error:
+            is_away, why = self.session.is_away, broken(error, "what is due cannot be done")
+            self.session.closed(now_ns, why)
+            return (Step.WAIT, now_ns + _REST_NS) if is_away else (Step.CLOSE, 0)
+
+    def _polled(self, now_ns: int) -> tuple[Step, int]:
         self.now_ns = now_ns
         due = []
         for endpoint in list(self._endpoints.values()):
@@ -264,11 +275,11 @@ def not_connected(core: Core) -> NoConnection:
     return NoConnection(core.words)
 
 
-def broken(error: Exception) -> str:
-    """Why a connection ends."""
+def broken(error: Exception, what: str = "what came cannot be taken") -> str:
+    """Why a connection ends. ``what`` failed, if that is a mistake of this package."""
     if isinstance(error, NoConnection):
         return str(error)
     if isinstance(error, OSError):
         return f"the connection broke: {error}"
-    _LOG.error("what the TCP router sent cannot be taken", exc_info=error)
-    return plain(f"what came cannot be taken: {type(error).__name__}: {error}")[:900]
+    _LOG.error("%s, so the connection is made anew", what, exc_info=error)
+    return plain(f"{what}: {type(error).__name__}: {error}")[:900]

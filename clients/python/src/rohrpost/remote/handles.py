@@ -4,87 +4,64 @@ from __future__ import annotations
 
 import os
 import threading
-from collections import deque
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..errors import Misuse, RohrpostError
 from ..interface import Module
 from ..names import Name
-from ..schema.tree import Type
 from .clock import passed_ns
-from .core import Endpoint
-from .following import Data, Following
-from .records import Record, RecordQueue
-from .streams import NoSuchStream, Wanted
+from .following import Data
+from .handed_out import DataQueue, Functions, RecordQueue
+from .records import Record
+from .streams import NoSuchStream
 
 if TYPE_CHECKING:
     from .client import Client
 
+T = TypeVar("T")
+H = TypeVar("H", bound="_Handle[Any]")
 
-class Proxy:
+
+class Proxy(Functions):
     """The functions of a module as methods, by its own description."""
 
-    def __init__(self, client: Client, endpoint: Endpoint, to: Name, timeout_s: float) -> None:
-        self._client, self._endpoint, self._to, self._timeout_s = client, endpoint, to, timeout_s
 
-    def __getattr__(self, function: str) -> Callable[..., Any]:
-        if function.startswith("__"):
-            raise AttributeError(function)
+class _Handle(Generic[T]):
+    """Something to be waited for, until ``close``, the end of ``with``, or that of its client."""
 
-        def call(*values: Any, **named: Any) -> Any:
-            return self._client._call_by_name(self._endpoint, self._to, function, values, named, self._timeout_s)
+    _kind, _content = "", ""
+    problem: RohrpostError | None
 
-        return call
-
-
-class Subscription:
-    """Data of a module as they come: ``for data in subscription``, or :meth:`next`. Ended by ``close`` or ``with``."""
-
-    _following: Following
-
-    def __init__(self, client: Client, room: int) -> None:
+    def __init__(self, client: Client) -> None:
         self._client = client
-        self._values: deque[Data] = deque(maxlen=max(1, room))
         self._is_closed = False
-        self.problem: RohrpostError | None = None
-        """What is wrong at present, if anything is; it goes on trying."""
-        self.dropped = 0
-        """Values that gave way here, since nobody took them."""
 
-    @property
-    def lost(self) -> int:
-        """Values that should have come and did not."""
-        return self._following.lost
+    def _next(self, is_there: Callable[[], Any], take: Callable[[], T], timeout_s: float | None) -> T:
+        client = self._client
 
-    @property
-    def type(self) -> Type | None:
-        """The type of the values, once the module has described itself."""
-        return self._following.type
+        def is_over() -> bool:
+            return self._is_closed or client._is_closed or isinstance(self.problem, NoSuchStream)
 
-    def _take(self, data: Data) -> None:
-        self.dropped += len(self._values) == self._values.maxlen
-        self._values.append(data)
+        with client._locked():
+            client._lock.wait_for(lambda: is_there() or is_over(), timeout_s)
+            if is_there():
+                return take()
+            if self._is_closed or client._is_closed:
+                raise Misuse(f"this {self._kind} is closed")
+            raise self.problem or TimeoutError(f"no {self._content} came within {timeout_s} s")
 
-    def _said(self, problem: RohrpostError | None) -> None:
-        self.problem = problem
+    def next(self, timeout_s: float | None = None) -> T:
+        raise NotImplementedError
 
-    def next(self, timeout_s: float | None = None) -> Data:
-        """The next value. Raises what is in the way, or :class:`TimeoutError`, if none comes in time."""
-        lock = self._client._lock
-        with self._client._locked():
-            lock.wait_for(lambda: self._values or self._is_closed or self._client._is_closed, timeout_s)
-            if self._values:
-                return self._values.popleft()
-            if self._is_closed or self._client._is_closed:
-                raise Misuse("this subscription is closed")
-            raise self.problem or TimeoutError(f"no data came within {timeout_s} s")
+    def _end(self, now_ns: int) -> None:
+        raise NotImplementedError
 
-    def __iter__(self) -> Iterator[Data]:
+    def __iter__(self) -> Iterator[T]:
         while not self._is_closed:
             yield self.next()
 
-    def __enter__(self) -> Subscription:
+    def __enter__(self: H) -> H:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -92,71 +69,55 @@ class Subscription:
 
     def close(self) -> None:
         """Ends it."""
-        if self._is_closed or self._client._is_closed or self._client._pid != os.getpid():
+        client = self._client
+        if self._is_closed or client._is_closed or client._pid != os.getpid():
             return
-        with self._client._lock:
+        with client._lock:
             self._is_closed = True
-            self._client._core.now_ns = passed_ns()
-            self._client._core.unfollow(self._client._core.own, self._following)
-            self._client._lock.notify_all()
-        self._client._wake()
+            self._end(passed_ns())
+            client._lock.notify_all()
+        client._wake()
 
 
-class RecordStream(RecordQueue):
+class Subscription(_Handle[Data], DataQueue):
+    """Data of a module as they come: ``for data in subscription``, or :meth:`next`. Ended by ``close`` or ``with``."""
+
+    _kind, _content = "subscription", "data"
+
+    def __init__(self, client: Client, room: int) -> None:
+        _Handle.__init__(self, client)
+        DataQueue.__init__(self, room)
+
+    def next(self, timeout_s: float | None = None) -> Data:
+        """The next value. Raises what is in the way, or :class:`TimeoutError`, if none comes in time."""
+        return self._next(lambda: self._values, self._values.popleft, timeout_s)
+
+    def _end(self, now_ns: int) -> None:
+        self._client._unfollow(now_ns, self)
+
+
+class RecordStream(_Handle[Record], RecordQueue):
     """A stream of a module, record by record: ``for record in stream``, :meth:`next` or :meth:`newest`. Ended by
     ``close`` or ``with``."""
 
-    _wanted: Wanted
+    _kind, _content = "stream", "record"
 
     def __init__(self, client: Client, room: int) -> None:
-        super().__init__(room)
-        self._client = client
-        self._is_closed = False
+        _Handle.__init__(self, client)
+        RecordQueue.__init__(self, room)
 
     def next(self, timeout_s: float | None = None) -> Record:
         """The next record that was not taken yet. Raises what is in the way, or :class:`TimeoutError`, if none comes in
         time."""
-        return self._wait(False, timeout_s)
+        return self._next(lambda: self._has(False), lambda: self._taken(False), timeout_s)
 
     def newest(self, timeout_s: float | None = None) -> Record:
         """The newest record that came, again if no newer one came since; the first one is waited for. :meth:`next` goes
         on behind it. Raises as :meth:`next` does."""
-        return self._wait(True, timeout_s)
+        return self._next(lambda: self._has(True), lambda: self._taken(True), timeout_s)
 
-    def _wait(self, newest: bool, timeout_s: float | None) -> Record:
-        client = self._client
-
-        def is_over() -> bool:
-            is_closed = self._is_closed or client._is_closed
-            return self._has(newest) or is_closed or isinstance(self.problem, NoSuchStream)
-
-        with client._locked():
-            client._lock.wait_for(is_over, timeout_s)
-            if self._has(newest):
-                return self._taken(newest)
-            if self._is_closed or client._is_closed:
-                raise Misuse("this stream is closed")
-            raise self.problem or TimeoutError(f"no record came within {timeout_s} s")
-
-    def __iter__(self) -> Iterator[Record]:
-        while not self._is_closed:
-            yield self.next()
-
-    def __enter__(self) -> RecordStream:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Ends it."""
-        if self._is_closed or self._client._is_closed or self._client._pid != os.getpid():
-            return
-        with self._client._lock:
-            self._is_closed = True
-            self._client._core.streams.remove(passed_ns(), self._wanted)
-            self._client._lock.notify_all()
-        self._client._wake()
+    def _end(self, now_ns: int) -> None:
+        self._client._unread(now_ns, self)
 
 
 class ModuleHost:

@@ -12,7 +12,7 @@ stamp, never by when they come.
 from __future__ import annotations
 
 import zlib
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -239,57 +239,3 @@ class Assembly:
         """Whether the stream was made anew, so that its sequences have nothing to do with earlier ones."""
         is_back = known.sequence <= newest.sequence
         return is_back or (known.life.server == newest.life.server and known.life != newest.life)
-
-
-class RecordQueue:
-    """Records of one stream that came and were not taken yet: so many as there is ``room`` for, the newest. What the
-    handles of both kinds of client share."""
-
-    def __init__(self, room: int) -> None:
-        self._waiting: deque[Record] = deque(maxlen=max(1, room))
-        self._newest: Record | None = None
-        self._passed_over = 0
-        self._assembly: Assembly | None = None
-        self.problem: RohrpostError | None = None
-        """What is wrong at present, if anything is; it goes on trying."""
-
-    def _takes_from(self, assembly: Assembly) -> None:
-        self._assembly = assembly
-
-    def _take(self, record: Record) -> None:
-        self._passed_over += len(self._waiting) == self._waiting.maxlen
-        self._waiting.append(record)
-        self._newest = record
-
-    def _said(self, problem: RohrpostError | None) -> None:
-        self.problem = problem
-
-    def _has(self, newest: bool) -> bool:
-        return self._newest is not None if newest else bool(self._waiting)
-
-    def _taken(self, newest: bool) -> Record:
-        """The newest, or the next one; there is one."""
-        if not newest:
-            return self._waiting.popleft()
-        assert self._newest is not None
-        self._passed_over += max(0, len(self._waiting) - 1)
-        self._waiting.clear()
-        return self._newest
-
-    @property
-    def missed(self) -> Missed:
-        """Records so far that did not come, or were not taken, by cause. The first that came is the first that
-        counts."""
-        assembly = self._assembly
-        return Missed() if assembly is None else Missed(assembly.lost, assembly.sampled, self._passed_over)
-
-    @property
-    def refused(self) -> dict[str, int]:
-        """Parts that were not taken, by cause, as ``rohrpost net`` counts them, and records of which the rest never
-        came (``incomplete``)."""
-        return {} if self._assembly is None else dict(+self._assembly.refused)
-
-    @property
-    def type(self) -> Type | None:
-        """The type of the records, once it is known."""
-        return None if self._assembly is None else self._assembly.type

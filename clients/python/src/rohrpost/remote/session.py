@@ -174,6 +174,11 @@ class Session:
         return self._state is State.MEMBER and self._holds
 
     @property
+    def is_away(self) -> bool:
+        """Whether there is no connection, nor one that is being made."""
+        return self._state is State.AWAY
+
+    @property
     def connections(self) -> int:
         """Connections that were made so far."""
         return self._attempt

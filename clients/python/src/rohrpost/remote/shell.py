@@ -14,7 +14,9 @@ from ..names import Name
 from . import calling
 from .clock import passed_ns
 from .core import Core
+from .handed_out import DataQueue, RecordQueue
 from .session import Settings
+from .streams import Wanted
 
 C = TypeVar("C", bound=type)
 
@@ -47,6 +49,32 @@ class Shell:
     def name(self, text: str | Name) -> Name:
         """The module that a text names, such as ``motor.0``."""
         return self._core.settings.installation.name(text)
+
+    def _follow(
+        self, subscription: DataQueue, name: str | Name, data: str, period_s: float, newest: bool, expected: Any
+    ) -> None:
+        """The shell's lock is held; so it is below."""
+        self._core.now_ns = passed_ns()
+        subscription._following = self._core.follow(
+            self._core.own, self.name(name), data, calling.expected_type(expected), int(period_s * 1e6), newest,
+            subscription._take, subscription._said,
+        )  # fmt: skip
+
+    def _unfollow(self, now_ns: int, subscription: DataQueue) -> None:
+        self._core.now_ns = now_ns
+        self._core.unfollow(self._core.own, subscription._following)
+
+    def _read_records(
+        self, reading: RecordQueue, name: str | Name, stream: str, expected: Any, most_bytes: int
+    ) -> None:
+        type = calling.expected_type(expected)
+        wanted = Wanted(self.name(name), stream, type, most_bytes, reading._take, reading._said)
+        self._core.streams.add(passed_ns(), wanted)
+        reading._wanted = wanted
+        reading._takes_from(wanted.assembly)
+
+    def _unread(self, now_ns: int, reading: RecordQueue) -> None:
+        self._core.streams.remove(now_ns, reading._wanted)
 
     def _check(self) -> None:
         if self._pid != os.getpid():

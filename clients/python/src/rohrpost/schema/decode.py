@@ -18,10 +18,11 @@ import struct
 from typing import Any
 
 from .errors import WalkError, counted, plain
-from .readers import READERS, Lend, Reader
+from .readers import READERS
+from .scalars import Lend, Reader
 from .tree import (
-    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct,
-    Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
+    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, VALUES_MAX, Array, Enum, List, Map, Named, Option, Plain,
+    Struct, Tuple, Type, Variant, float_of, is_byte, is_empty, is_nullable, unwrapped,
 )  # fmt: skip
 
 _READER = READERS.name
@@ -63,6 +64,10 @@ def made(python: Any, *values: Any, **named: Any) -> Any:
         raise WalkError(f"its class does not take it: {words}") from error
 
 
+def _too_many() -> WalkError:
+    return WalkError(f"more than {VALUES_MAX} values in one; send many numbers as bytes, or as lists of f32 or f64")
+
+
 class Decoder:
     """Reads one value after the other."""
 
@@ -72,11 +77,15 @@ class Decoder:
         self.at = 0
         self.depth = 0
         self.empty_left = EMPTY_MAX
+        self.left = VALUES_MAX
 
     def value(self, type: Type) -> Any:
         """The next one, which is of this type."""
         if self.depth >= DEPTH_MAX:
             raise WalkError(f"nested more than {DEPTH_MAX} deep")
+        self.left -= 1
+        if self.left < 0:
+            raise _too_many()
         before = self.at
         self.depth += 1
         value = self.unbounded(unwrapped(type))
@@ -98,10 +107,9 @@ class Decoder:
         if isinstance(type, List):
             if is_byte(type.element):
                 return self.octets()
-            length = self.length(type.is_of_empty)
-            return [self.element(type.element, index) for index in range(length)]
+            return self.many(type.element, self.length(type.is_of_empty))
         if isinstance(type, Array):
-            return [self.element(type.element, index) for index in range(type.length)]
+            return self.many(type.element, type.length)
         if isinstance(type, Tuple):
             return tuple(self.element(element, index) for index, element in enumerate(type.elements))
         if isinstance(type, Map):
@@ -129,6 +137,13 @@ class Decoder:
                 raise WalkError("not exactly one character")
             return text
         return None
+
+    def many(self, type: Type, length: int) -> list[Any]:
+        if float_of(type):
+            self.left += length  # They are small, and read at once otherwise.
+        if length > self.left and not is_empty(type):
+            raise _too_many()
+        return [self.element(type, index) for index in range(length)]
 
     def element(self, type: Type, index: int) -> Any:
         try:

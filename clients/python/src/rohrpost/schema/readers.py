@@ -6,7 +6,8 @@
                   └─ Unread, or the bytes end ─▶ Decoder, which reads all anew and says what is wrong, and where
 
 So errors have one place that words them. What :class:`.decode.Decoder` counts while it reads, depth and values without
-bytes, is bounded here before a reader is made: a type that may go beyond has none.
+bytes, is bounded here before a reader is made: a type that may go beyond has none. All values are counted where a list
+begins, each element as what it has at most. What is too much then is for the Decoder, which counts each.
 """
 
 from __future__ import annotations
@@ -18,28 +19,38 @@ from dataclasses import dataclass
 from typing import Any, Optional
 
 from .kept import Kept
+from .scalars import Lend, Reader, Unread, long_number, nothing, octets, plain_reader
 from .tree import (
-    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, Array, Enum, List, Map, Members, Named, Option, Plain,
-    Struct, Tuple, Type, Variant, float_of, is_byte, is_nullable, unwrapped,
+    DEPTH_MAX, EMPTY_MAX, VALUES_MAX, Array, Enum, List, Map, Members, Named, Option, Plain, Struct, Tuple, Type,
+    Variant, float_of, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
 
-Lend = Optional[Callable[[int, int], Any]]
-"""What ``bytes`` from here to there become, if they are a value; none: they are copied."""
-Reader = Callable[[Any, int, Lend], tuple[Any, int]]
-"""From bytes, and where a value begins in them: the value, and where it ends."""
 
+class _Counting:
+    """What the readers of a type with several lists hand on as what lends: it knows how many values may come yet."""
 
-class Unread(Exception):
-    """These bytes are for :class:`.decode.Decoder`."""
+    __slots__ = ("data", "left", "lend")
+
+    def __init__(self, data: Any, lend: Lend, left: int) -> None:
+        self.data, self.lend, self.left = data, lend, left
+
+    def __call__(self, start: int, end: int) -> Any:
+        return bytes(self.data[start:end]) if self.lend is None else self.lend(start, end)
 
 
 def reader_of(type: Type) -> Reader | None:
-    """Makes a reader of a type; none: it nests too deep, or may have too many values that take no bytes."""
+    """Makes a reader of a type; none: it nests too deep, or may have too many values, or such as take no bytes."""
     try:
-        made = _Maker().made(type, 0)
+        made = _Maker(None).made(type, 0)
     except Unread:
         return None
-    return made.read if made.empties <= EMPTY_MAX else None
+    left = VALUES_MAX - made.values
+    if made.empties > EMPTY_MAX or left < 0:
+        return None
+    if made.lists == 1:
+        # Not in another one: its length alone says how many there are.
+        return _Maker(left).made(type, 0).read
+    return _counting(made.read, left) if made.lists else made.read
 
 
 READERS = Kept("reader", reader_of)
@@ -47,14 +58,17 @@ READERS = Kept("reader", reader_of)
 
 @dataclass
 class _Made:
-    """A reader. ``empties``: values that take no bytes in one that is read, at most. ``bits``: of whole numbers without
-    a sign, which a struct reads itself: that is quicker than to call."""
+    """A reader. ``empties``: values that take no bytes in one that is read, at most; ``values``: all, but for those in
+    its ``lists`` of which elements are counted; two stand for more. ``bits``: of whole numbers without a sign, which a
+    struct reads itself: that is quicker than to call."""
 
     read: Reader
     empties: int = 0
     is_empty: bool = False
     depth: int = 1
     bits: int = 0
+    values: int = 1
+    lists: int = 0
 
     @property
     def part(self) -> Reader | int:
@@ -63,10 +77,12 @@ class _Made:
 
 
 class _Maker:
-    """Makes the readers of one type; a part that it has several times has one reader."""
+    """Makes the readers of one type; a part that it has several times has one reader. ``room``: for the values of its
+    one list; none: there are more, and :class:`_Counting` knows."""
 
-    def __init__(self) -> None:
+    def __init__(self, room: int | None) -> None:
         self._known: dict[int, _Made] = {}
+        self._room = room
 
     def made(self, type: Type, depth: int) -> _Made:
         type = unwrapped(type)
@@ -83,17 +99,22 @@ class _Maker:
     def _of(self, type: Type, depth: int) -> _Made:
         if isinstance(type, Plain):
             signed, bits = type.integer or (True, 0)
-            return _Made(_plain(type), 0, type.tag == 0, 1, 0 if signed or bits == 8 else bits)
+            return _Made(plain_reader(type), 0, type.tag == 0, 1, 0 if signed or bits == 8 else bits)
         if isinstance(type, Option):
             inner = self.made(type.inner, depth)
-            return _around(_option(inner.read, is_nullable(type.inner)), inner)
+            made = _around(_option(inner.read, is_nullable(type.inner)), inner)
+            made.values, made.lists = 1 + inner.values, inner.lists
+            return made
         if isinstance(type, List):
-            return _Made(_octets) if is_byte(type.element) else self._list(type, depth)
+            return _Made(octets) if is_byte(type.element) else self._list(type, depth)
         if isinstance(type, Array):
             inner = self.made(type.element, depth)
             empties = min(type.length * inner.empties, EMPTY_MAX + 1)
-            read = _many(inner.read, float_of(type.element), type.length)
-            return _Made(read, empties, inner.is_empty or not type.length, inner.depth + 1)
+            as_float, is_empty = float_of(type.element), inner.is_empty or not type.length
+            values = 1 if as_float else 1 + min(type.length * inner.values, VALUES_MAX)
+            lists = min(type.length * inner.lists, 2)
+            read = _many(inner, as_float, type.length, None)
+            return _Made(read, empties, is_empty, inner.depth + 1, 0, values, lists)
         if isinstance(type, Tuple):
             inners = [self.made(it, depth) for it in type.elements]
             return _together(_several([it.part for it in inners], _as_tuple), inners)
@@ -107,15 +128,20 @@ class _Maker:
         inner = self.made(type.element, depth)
         if inner.empties:
             raise Unread
-        return _around(_many(inner.read, float_of(type.element), None), inner)
+        as_float = float_of(type.element)
+        made = _around(_many(inner, as_float, None, self._room), inner)
+        made.lists = 0 if as_float else 1 + min(inner.lists, 1)
+        return made
 
     def _map(self, type: Map, depth: int) -> _Made:
         # A pair is one more that nests, where the value is a list of them.
         inners = [self.made(it, depth + (not type.has_words)) for it in (type.key, type.value)]
         if inners[0].empties or inners[1].empties:
             raise Unread
-        made = _together(_map(inners[0].read, inners[1].read, type.has_words), inners)
+        each = inners[0].values + inners[1].values + (not type.has_words)
+        made = _together(_map(inners[0].read, inners[1].read, type.has_words, (each, self._room)), inners)
         made.depth += not type.has_words
+        made.values, made.lists = 1, 1 + min(made.lists, 1)
         return made
 
     def _members(self, named: Named, depth: int) -> list[_Made]:
@@ -128,7 +154,7 @@ class _Maker:
         inners = self._members(named, depth) if named.kind else []
         names = [field.name for field in named.fields]
         if named.kind == 0:
-            return _Made(_nothing if python is None else _made_of_nothing(python), 0, True)
+            return _Made(nothing if python is None else _made_of_nothing(python), 0, True)
         make = _payload(named) if python is None else _called(python, names)
         return _together(_several([it.part for it in inners], make), inners)
 
@@ -138,16 +164,18 @@ class _Maker:
         # What nobody can change is the same each time.
         is_fixed = type.python is None or isinstance(type.python, Members)
         inners: list[_Made] = []
+        most = 0
         for variant in type.variants:
             its = self._members(variant, depth) if variant.kind else []
             inners += its
+            most = max(most, sum(it.values for it in its))
             read = its[0].read if variant.kind == 1 else None
             if variant.kind > 1:
                 read = _several([it.part for it in its], _payload(variant))
             fixed = python(variant.name, None) if is_fixed and not variant.kind else None
             variants.append((fixed, variant.name, read))
         made = _together(_enum(variants, python), inners)
-        made.is_empty = False
+        made.is_empty, made.values = False, 1 + most
         return made
 
 
@@ -158,7 +186,9 @@ def _around(read: Reader, inner: _Made) -> _Made:
 def _together(read: Reader, inners: list[_Made]) -> _Made:
     empties = min(sum(it.empties for it in inners), EMPTY_MAX + 1)
     is_empty = all(it.is_empty for it in inners)
-    return _Made(read, empties, is_empty, max((it.depth for it in inners), default=0) + 1)
+    values = 1 + min(sum(it.values for it in inners), VALUES_MAX)
+    lists = min(sum(it.lists for it in inners), 2)
+    return _Made(read, empties, is_empty, max((it.depth for it in inners), default=0) + 1, 0, values, lists)
 
 
 # What makes values.
@@ -189,109 +219,12 @@ def _called(python: Any, names: list[str]) -> Callable[..., Any]:
 # Readers.
 
 
-def _nothing(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    return None, at
+def _counting(inner: Reader, left: int) -> Reader:
+    return lambda data, at, lend: inner(data, at, _Counting(data, lend, left))
 
 
 def _made_of_nothing(python: Any) -> Reader:
     return lambda data, at, lend: (python(), at)
-
-
-def _long(data: Any, at: int, bits: int) -> tuple[int, int]:
-    number = shift = 0
-    while shift < bits:
-        byte = data[at]
-        at += 1
-        number |= (byte & 0x7F) << shift
-        if byte < 0x80:
-            if number >> bits:
-                break
-            return number, at
-        shift += 7
-    raise Unread
-
-
-def _unsigned(bits: int) -> Reader:
-    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-        byte = data[at]
-        if byte < 0x80:
-            return byte, at + 1
-        second = data[at + 1]
-        if second < 0x80:
-            return byte & 0x7F | second << 7, at + 2
-        return _long(data, at, bits)
-
-    return read
-
-
-def _signed(bits: int) -> Reader:
-    def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-        number, at = _long(data, at, bits)
-        return number >> 1 ^ -(number & 1), at
-
-    return read
-
-
-def _u8(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    return data[at], at + 1
-
-
-def _i8(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    byte = data[at]
-    return byte - 256 if byte > 127 else byte, at + 1
-
-
-def _bool(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    byte = data[at]
-    if byte > 1:
-        raise Unread
-    return byte == 1, at + 1
-
-
-def _f64(data: Any, at: int, lend: Lend, read: Any = struct.Struct("<d").unpack_from) -> tuple[Any, int]:
-    return read(data, at)[0], at + 8
-
-
-def _f32(data: Any, at: int, lend: Lend, read: Any = struct.Struct("<f").unpack_from) -> tuple[Any, int]:
-    return read(data, at)[0], at + 4
-
-
-def _span(data: Any, at: int) -> tuple[int, int]:
-    """Where counted bytes begin and end."""
-    length, at = _long(data, at, 64)
-    end = at + length
-    if end > len(data):
-        raise Unread
-    return at, end
-
-
-def _octets(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    at, end = _span(data, at)
-    return bytes(data[at:end]) if lend is None else lend(at, end), end
-
-
-def _text(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    at, end = _span(data, at)
-    return str(data[at:end], "utf-8"), end
-
-
-def _char(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-    text, at = _text(data, at, lend)
-    if len(text) != 1:
-        raise Unread
-    return text, at
-
-
-_PLAIN: dict[Plain, Reader] = {BOOL: _bool, F32: _f32, F64: _f64, TEXT: _text, BYTES: _octets, CHAR: _char}
-
-
-def _plain(type: Plain) -> Reader:
-    if type.integer is None:
-        return _PLAIN.get(type, _nothing)
-    signed, bits = type.integer
-    if bits == 8:
-        return _i8 if signed else _u8
-    return _signed(bits) if signed else _unsigned(bits)
 
 
 def _option(inner: Reader, is_marked: bool) -> Reader:
@@ -307,19 +240,30 @@ def _option(inner: Reader, is_marked: bool) -> Reader:
     return read
 
 
-def _claimed(data: Any, at: int) -> tuple[int, int]:
-    """How many elements; each of them takes a byte at least."""
-    length, at = _long(data, at, 64)
+def _claimed(data: Any, at: int, lend: Any, each: int, room: int | None) -> tuple[int, int]:
+    """How many elements; each of them takes a byte at least, and is so many values."""
+    length = data[at]
+    if length < 0x80:
+        at += 1
+    else:
+        length, at = long_number(data, at, 64)
     if length > len(data) - at:
         raise Unread
+    if each:
+        left = room
+        if left is None:
+            left = lend.left
+            lend.left -= length * each
+        if length * each > left:
+            raise Unread
     return length, at
 
 
-def _many(inner: Reader, as_float: str, fixed: int | None) -> Reader:
-    size = struct.calcsize(as_float)
+def _many(element: _Made, as_float: str, fixed: int | None, room: int | None) -> Reader:
+    size, inner, each = struct.calcsize(as_float), element.read, 0 if as_float else element.values
 
     def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-        length, at = _claimed(data, at) if fixed is None else (fixed, at)
+        length, at = _claimed(data, at, lend, each, room) if fixed is None else (fixed, at)
         if as_float:
             end = at + length * size
             if end > len(data):
@@ -349,16 +293,16 @@ def _several(inners: list[Reader | int], make: Callable[..., Any]) -> Reader:
                     if second < 0x80:
                         value, at = value & 0x7F | second << 7, at + 2
                     else:
-                        value, at = _long(data, at, inner)
+                        value, at = long_number(data, at, inner)
             values.append(value)
         return make(*values), at
 
     return read
 
 
-def _map(key: Reader, value: Reader, has_words: bool) -> Reader:
+def _map(key: Reader, value: Reader, has_words: bool, counted: tuple[int, int | None]) -> Reader:
     def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-        length, at = _claimed(data, at)
+        length, at = _claimed(data, at, lend, *counted)
         pairs = []
         for _ in range(length):
             first, at = key(data, at, lend)
@@ -379,7 +323,7 @@ def _enum(variants: list[_Chosen], make: Callable[[str, Any], Any]) -> Reader:
         if index < 0x80:
             at += 1
         else:
-            index, at = _long(data, at, 32)
+            index, at = long_number(data, at, 32)
         fixed, name, inner = variants[index]
         if inner is None:
             return make(name, None) if fixed is None else fixed, at
