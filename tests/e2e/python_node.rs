@@ -267,6 +267,31 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
 }
 
 #[test]
+fn a_view_that_outlives_its_record_is_told_and_leads_nowhere_else() {
+    let mut scene = Scene::launched(FAULTY, "mood = \"good\"");
+    scene.robot.wait_on(&mut scene.launch);
+    let keeps = answers(&scene, "keeps");
+    for words in [
+        "slice: Misuse: a view of record ",
+        "still there: True",
+        "whole: Misuse: a view of record ",
+        "failed: ValueError: its own",
+        "circle: no exception, but None",
+        "write: TypeError: cannot modify read-only memory",
+        "twice: Misuse: a record of `image` of camera.0 is in hand; leave its `with` before another is read",
+        "again: Record(value=Image(width_px=",
+        "picky 0: BadReply: ",
+        "picky 1: BadReply: ",
+        "`odometry` of odometry.0: its class does not take it: ValueError: too far",
+        "laser: dict",
+        "meanwhile: {' opened in another thread, that of its module, which alone may read it'}",
+    ] {
+        assert!(keeps.contains(words), "{words}: {keeps}");
+    }
+    scene.stop();
+}
+
+#[test]
 fn by_hand_it_says_why_it_does_not_start_and_ends_by_control_c() {
     let place = Place::new();
     let (package, config) = (package(&place), place.path("robot.toml"));

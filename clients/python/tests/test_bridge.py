@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import importlib
 import sys
 import types
@@ -17,14 +16,7 @@ from rohrpost.schema import encode
 from rohrpost.schema.binary import field_to_bytes
 from rohrpost.schema.tree import Field
 
-
-class Memory:
-    """Stands for memory that is shared."""
-
-    def __init__(self, length: int) -> None:
-        self.bytes = bytearray(length)
-        self._array = (ctypes.c_ubyte * length).from_buffer(self.bytes)
-        self.address, self.length = ctypes.addressof(self._array), length
+from .memory import Memory
 
 
 class Runtime(types.ModuleType):

@@ -4,6 +4,7 @@
 import atexit
 import logging
 import os
+import pickle
 import sys
 import threading
 from dataclasses import replace
@@ -17,6 +18,17 @@ class Note:
 
     words: str
     more: bytes
+
+
+@rp.data(name="rohrpost.Odometry")
+class Picky:
+    """An odometry that nobody gets."""
+
+    pose: rp.Pose
+    twist: rp.Twist
+
+    def __post_init__(self) -> None:
+        raise ValueError("too far")
 
 
 def said(part) -> str:
@@ -167,6 +179,64 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         thread.start()
         thread.join()
         return told + other
+
+    @rp.command(30)
+    def keeps(self) -> list[str]:
+        """Views of records, beyond their `with`."""
+        camera = self.stream("camera.0", "image", rp.Image, timeout_s=20)
+
+        def seen(look):
+            with camera.newest() as record:
+                return look(record.value.pixels)
+
+        def keep(part) -> None:
+            self.kept = part
+
+        def keep_and_fail(pixels) -> None:
+            self.kept = pixels[1:]
+            raise ValueError("its own")
+
+        def circle(pixels) -> None:
+            part = pixels[1:]
+            try:
+                raise RuntimeError(str(len(part)))
+            except RuntimeError as error:
+                stays = error  # noqa: F841
+
+        def pester() -> None:
+            while not is_over.is_set():
+                pestered.add(said(camera.missed).split(" was")[-1])
+
+        with camera.next(timeout_s=20):
+            pass
+        told = [f"slice: {said(lambda: seen(lambda pixels: keep(pixels[1:])))}"]
+        told.append(f"still there: {len(bytes(self.kept)) > 1000}")
+        keep(None)
+        told.append(f"whole: {said(lambda: seen(lambda pixels: keep(pickle.PickleBuffer(pixels))))}")
+        keep(None)
+        told.append(f"failed: {said(lambda: seen(keep_and_fail))}")
+        keep(None)
+        told.append(f"circle: {said(lambda: seen(circle))}")
+        told.append(f"write: {said(lambda: seen(lambda pixels: pixels.__setitem__(0, 1)))}")
+        newest = camera.newest()
+        with newest:
+            told.append(f"twice: {said(newest.__enter__)}")
+        with newest as record:
+            told.append(f"again: {record!r}")
+        picky = self.stream("odometry.0", "odometry", Picky, timeout_s=20)
+        told += [f"picky {it}: {said(picky.next(timeout_s=20).__enter__)}" for it in range(2)]
+        with self.stream("laser.0", "scan", timeout_s=20).next(timeout_s=20) as record:
+            told.append(f"laser: {type(record.value).__name__}")
+        is_over, pestered = threading.Event(), set()
+        thread = threading.Thread(target=pester)
+        thread.start()
+        # More than are there by now, so that it waits.
+        for _ in range(15):
+            said(lambda: camera.next(timeout_s=20).__enter__())
+            newest.__exit__(None, None, None)
+        is_over.set()
+        thread.join()
+        return [*told, f"meanwhile: {pestered}"]
 
     @rp.command(26)
     def hears(self, word: str) -> None:

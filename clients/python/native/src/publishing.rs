@@ -2,7 +2,7 @@
 
 use crate::fails::{failure, misuse};
 use crate::lent::{is_forked, with};
-use crate::values::Shared;
+use crate::shared::Shared;
 use pyo3::prelude::*;
 use rohrpost_native::{FollowRate, Moment, RecordRoom, SayLevel};
 use std::time::Duration;
@@ -42,11 +42,11 @@ pub(crate) fn begin(
     stamp_ns: Option<u64>,
     front: &[u8],
     length: usize,
-) -> PyResult<Option<Shared>> {
+) -> PyResult<Option<Py<PyAny>>> {
     with(py, |context| {
         let room = context.begin(number, stamp_ns.map(Moment::Ns), front, length);
         Ok(match room.map_err(|error| failure(py, error))? {
-            RecordRoom::Shared(place, range) => Some(Shared::part(place, range)),
+            RecordRoom::Shared(place, range) => Some(Shared::new(py, place, range, false)?.into_any()),
             RecordRoom::Own(_) => None,
         })
     })

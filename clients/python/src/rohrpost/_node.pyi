@@ -1,21 +1,50 @@
 """The part of this package that is Rust; see ``clients/python/native``."""
 
-class Shared:
-    """Bytes in shared memory, which stays mapped as long as this is there."""
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
 
-    @property
-    def address(self) -> int: ...
+class Shared:
+    """A buffer: bytes in shared memory, which stays mapped as long as this is there."""
+
     @property
     def length(self) -> int: ...
+    @property
+    def views(self) -> int: ...
+    def __buffer__(self, flags: int, /) -> memoryview: ...
 
-_Record = tuple[int, int, int, bytes | Shared]
+class Record:
+    """A record in hand."""
+
+    @property
+    def value(self) -> Any:
+        """Its value; many ``bytes`` in it are a view, which is there as long as the record is in hand."""
+    @property
+    def time_ns(self) -> int:
+        """When it was true, ns since 1970."""
+    @property
+    def epoch(self) -> int:
+        """Epoch of system time; times of different ones cannot be subtracted."""
+    @property
+    def sequence(self) -> int:
+        """Its number in the stream."""
+
+class InHand:
+    """A record, from the beginning of a ``with`` to its end."""
+
+    def __enter__(self) -> Record: ...
+    def __exit__(
+        self, error: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None, /
+    ) -> None: ...
 
 class Stream:
     """A stream of another module; for the thread that opened it."""
 
-    def newest(self) -> _Record | None: ...
-    def next(self, timeout_s: float) -> tuple[_Record | None, int]: ...
-    def record(self, sequence: int) -> _Record | None: ...
+    def reads(self, what: str, plan: tuple[str, Any] | None, held: Callable[[bytes | Shared], object]) -> None: ...
+    def in_hand(self, find: Callable[[], None] | None = None) -> InHand: ...
+    def next(self, timeout_s: float) -> tuple[bool, int]: ...
+    def record(self, sequence: int) -> bool: ...
+    def copied(self, sequence: int) -> bytes | None: ...
     def around(self, stamp_ns: int) -> tuple[tuple[tuple[int, int], tuple[int, int]] | None, str]: ...
     def missed(self) -> tuple[int, int, int]: ...
 

@@ -221,7 +221,7 @@ class Bridge(NodeHost):
         item = self._written(stream)
         shared = _node.begin(item.number, time_ns, self._encoded(item, value), length)
         own = bytearray(length if shared is None else 0)
-        view = None if shared is None else View(shared, is_writable=True)
+        view = None if shared is None else View(shared)
         opened = self._opened = _Opened(stream, view)
         try:
             yield memoryview(own) if view is None else view.whole

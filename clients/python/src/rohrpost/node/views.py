@@ -2,20 +2,17 @@
 
 ::
 
-    Shared (Rust: keeps the memory mapped) ◀── an array of ctypes ◀── memoryview ◀── what an author makes of it
+    Shared (Rust: keeps the memory mapped, counts views) ◀── memoryview ◀── what an author makes of it
 
-What an author keeps of it keeps the array, and that the memory: no view ever leads nowhere. But its bytes are those of
+What an author keeps of it keeps the memory: no view ever leads nowhere. But its bytes are those of
 another record by then, so it is told. A record that is filled while its view is kept is never one for others, and its
 stream takes no other until the view is let go.
 """
 
 from __future__ import annotations
 
-import ctypes
-import functools
 import gc
-import weakref
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import Misuse
 from ..schema.decode import decode
@@ -28,21 +25,12 @@ VIEWED_MIN = 1024
 """Shorter bytes in a value are copied: that is quicker than a view."""
 
 
-@functools.lru_cache(maxsize=16)
-def _array_of(length: int) -> Any:
-    """Its class, of which the making takes a while: most records of a stream are of one length."""
-    return ctypes.c_ubyte * length
-
-
 class View:
     """Bytes of a record while they are lent."""
 
-    def __init__(self, shared: Shared, is_writable: bool = False) -> None:
-        array: Any = _array_of(shared.length).from_address(shared.address)
-        array.keeps = shared
-        self._array = weakref.ref(array)
-        whole = memoryview(array).cast("B")
-        self.whole = whole if is_writable else whole.toreadonly()
+    def __init__(self, shared: Shared) -> None:
+        self._shared = shared
+        self.whole = memoryview(shared)
         self._lent = [self.whole]
 
     def lend(self, start: int, end: int) -> memoryview | bytes:
@@ -69,7 +57,7 @@ class View:
                 return False
         self._lent.clear()
         self.__dict__.pop("whole", None)
-        return self._array() is None
+        return not self._shared.views
 
 
 class Held:
