@@ -988,9 +988,14 @@ rohrpost_code rohrpost_module_publish(uint16_t number, uint64_t stamp_ns, const 
 // the result, to be read from `reply`; it is there until the next such call, and empty when this fails. Waits for it
 // at most `timeout_ns`, and all else of the module with it. The first call asks the other one what it offers.
 //
+// `interface` is the hash of the interface that the caller goes by: `MOTOR_HASH` of the header that
+// `rohrpost interface generate --lang c` writes, or what `rohrpost_interface_hash` gives. Nothing is run by another
+// one: `ROHRPOST_FAULT`, and the last error says that they differ.
+//
 // Pointers:
 // The text is null or ends with a zero; `arguments` is null, or points to `len` bytes.
 rohrpost_code rohrpost_module_call(const char *module,
+                                   uint32_t interface,
                                    uint16_t function,
                                    const void *arguments,
                                    size_t len,
@@ -1003,6 +1008,7 @@ rohrpost_code rohrpost_module_call(const char *module,
 // Pointers:
 // The text is null or ends with a zero.
 rohrpost_code rohrpost_module_get(const char *module,
+                                  uint32_t interface,
                                   uint16_t number,
                                   uint64_t timeout_ns,
                                   struct rohrpost_decoder *reply);

@@ -26,7 +26,9 @@ const TURN: u64 = 1 << 24;
 /// Threads are told apart by so many bits.
 const THREAD_MASK: u32 = (1 << 24) - 1;
 
-/// What a child has of its parent, never dropped. Here, for programs that look for memory which nobody knows any more.
+/// What a child has of its parent, never dropped. Here, for programs that look for memory which nobody knows any more;
+/// marked, since a compiler need not write what nothing reads.
+#[used]
 static OF_PARENT: AtomicPtr<Vec<Place>> = AtomicPtr::new(std::ptr::null_mut());
 /// The last thread that was counted.
 static THREADS: AtomicU32 = AtomicU32::new(0);

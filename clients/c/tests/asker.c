@@ -27,6 +27,23 @@ static const rohrpost_data DATA[] = {
 };
 static const rohrpost_interface ASKER =
     ROHRPOST_INTERFACE("Asker", "asker", NULL, ROHRPOST_ALL(FUNCTIONS), ROHRPOST_ALL(DATA));
+// The other module's, as `docs/src/c.md` has it; and as it may have been once, with another unit.
+static const rohrpost_field CALIBRATE_ARGUMENTS[] = {
+    ROHRPOST_FIELD("true_c", ROHRPOST_F64, "°C", "What another thermometer says."),
+};
+static const rohrpost_function CALIBRATE[] = {
+    ROHRPOST_FUNCTION(16, "calibrate", CALIBRATE_ARGUMENTS, ROHRPOST_F64, "Returns the correction from now on."),
+};
+static const rohrpost_data CELSIUS[] = {
+    ROHRPOST_PUBLISHED(1, "temperature", ROHRPOST_F64, "°C", "Of the motor's winding."),
+};
+static const rohrpost_data KELVIN[] = {
+    ROHRPOST_PUBLISHED(1, "temperature", ROHRPOST_F64, "K", "Of the motor's winding."),
+};
+static const rohrpost_interface THERMOMETER = ROHRPOST_INTERFACE("Thermometer", "thermometer",
+    "Says how warm the motor is.", ROHRPOST_ALL(CALIBRATE), ROHRPOST_ALL(CELSIUS));
+static const rohrpost_interface OLD_THERMOMETER = ROHRPOST_INTERFACE("Thermometer", "thermometer",
+    "Says how warm the motor is.", ROHRPOST_ALL(CALIBRATE), ROHRPOST_ALL(KELVIN));
 static const rohrpost_parameter PARAMETERS[] = {
     ROHRPOST_PARAMETER("share", ROHRPOST_U8, "%", NULL, "50", "1", "100"),
 };
@@ -91,16 +108,26 @@ static rohrpost_outcome calls(void) {
     rohrpost_put_f64(&encoder, 30);
     DONE(rohrpost_encoded(&encoder, &len));
     const uint64_t long_ns = 60 * (uint64_t)SECOND_NS;
-    DONE(rohrpost_module_call("thermometer.0", 16, bytes, len, long_ns, &reply));
+    uint32_t hash, old;
+    DONE(rohrpost_interface_hash(&THERMOMETER, &hash));
+    DONE(rohrpost_interface_hash(&OLD_THERMOMETER, &old));
+    DONE(rohrpost_module_call("thermometer.0", hash, 16, bytes, len, long_ns, &reply));
     HOLDS(rohrpost_get_f64(&reply) == 10);
     DONE(rohrpost_decoded(&reply));
-    GIVES(ROHRPOST_NULL_POINTER, rohrpost_module_call("thermometer.0", 16, bytes, len, long_ns, NULL));
-    GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", 16, bytes, len - 1, long_ns, &reply));
-    GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", 99, NULL, 0, long_ns, &reply));
+    GIVES(ROHRPOST_NULL_POINTER, rohrpost_module_call("thermometer.0", hash, 16, bytes, len, long_ns, NULL));
+    GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", hash, 16, bytes, len - 1, long_ns, &reply));
+    GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", hash, 99, NULL, 0, long_ns, &reply));
+    // By another interface nothing is run, and nothing is read.
     reply = rohrpost_decode("\x07", 1);
-    GIVES(ROHRPOST_CONFIGURATION, rohrpost_module_call("nobody.0", 16, NULL, 0, long_ns, &reply));
+    GIVES(ROHRPOST_FAULT, rohrpost_module_call("thermometer.0", old, 16, bytes, len, long_ns, &reply));
+    HOLDS(strstr(rohrpost_last_error(), "interface differs") != NULL);
     HOLDS(rohrpost_get_u8(&reply) == 0 && rohrpost_decoded(&reply) == ROHRPOST_MALFORMED);
-    DONE(rohrpost_module_get("thermometer.0", 1, long_ns, &reply));
+    GIVES(ROHRPOST_FAULT, rohrpost_module_get("thermometer.0", old, 1, long_ns, &reply));
+    HOLDS(strstr(rohrpost_last_error(), "interface differs") != NULL);
+    reply = rohrpost_decode("\x07", 1);
+    GIVES(ROHRPOST_CONFIGURATION, rohrpost_module_call("nobody.0", hash, 16, NULL, 0, long_ns, &reply));
+    HOLDS(rohrpost_get_u8(&reply) == 0 && rohrpost_decoded(&reply) == ROHRPOST_MALFORMED);
+    DONE(rohrpost_module_get("thermometer.0", hash, 1, long_ns, &reply));
     HOLDS(rohrpost_get_u64(&reply) > 0);
     rohrpost_get_f64(&reply);
     return rohrpost_decoded(&reply);

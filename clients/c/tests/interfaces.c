@@ -138,8 +138,8 @@ static void outside_of_a_module_all_is_refused(void) {
     GIVES(ROHRPOST_OUTSIDE, rohrpost_module_parameter("x", &value));
     GIVES(ROHRPOST_OUTSIDE, rohrpost_module_follow("x.0", "y", 0, 0, &number));
     GIVES(ROHRPOST_VALUE, rohrpost_module_follow("x.0", "y", 9, 0, &number));
-    GIVES(ROHRPOST_OUTSIDE, rohrpost_module_call("x.0", 16, NULL, 0, 1, &value));
-    GIVES(ROHRPOST_OUTSIDE, rohrpost_module_get("x.0", 1, 1, &value));
+    GIVES(ROHRPOST_OUTSIDE, rohrpost_module_call("x.0", 7, 16, NULL, 0, 1, &value));
+    GIVES(ROHRPOST_OUTSIDE, rohrpost_module_get("x.0", 7, 1, 1, &value));
     GIVES(ROHRPOST_OUTSIDE, rohrpost_module_watch(0, ROHRPOST_READ, &number));
     GIVES(ROHRPOST_OUTSIDE, rohrpost_module_unwatch(0));
     GIVES(ROHRPOST_NULL_POINTER, rohrpost_say(ROHRPOST_LEVEL_INFO, NULL));

@@ -76,8 +76,8 @@ pub(super) fn write(blueprint: &Blueprint<'_>) -> Result<String, Refusal> {
     code += &c_comment("", blueprint.text);
     code += &format!("#define {upper}_CLASS {}\n", c_literal(blueprint.class));
     code += &format!(
-        "/** Tells this interface from others; callers and servers have the same. */\n#define {upper}_HASH \
-         UINT32_C({:#010x})\n\n/* Numbers of functions and of data. */\n\n{numbers}\n{}\n",
+        "/** Tells this interface from others; callers and servers have the same. For `rohrpost_module_call`. \
+         */\n#define {upper}_HASH UINT32_C({:#010x})\n\n/* Numbers of functions and of data. */\n\n{numbers}\n{}\n",
         blueprint.hash, types.code
     );
     code += &description(&prefix, &blueprint.bytes);

@@ -466,7 +466,7 @@ static inline void *rp_unpack_list(rp_unpacker *from, size_t *count, size_t size
 
 /** Holds things. */
 #define GRIPPER_CLASS "gripper"
-/** Tells this interface from others; callers and servers have the same. */
+/** Tells this interface from others; callers and servers have the same. For `rohrpost_module_call`. */
 #define GRIPPER_HASH UINT32_C(0x341216c5)
 
 /* Numbers of functions and of data. */

@@ -466,7 +466,7 @@ static inline void *rp_unpack_list(rp_unpacker *from, size_t *count, size_t size
 
 /** All kinds of types, and of names. */
 #define ZOO_CLASS "zoo"
-/** Tells this interface from others; callers and servers have the same. */
+/** Tells this interface from others; callers and servers have the same. For `rohrpost_module_call`. */
 #define ZOO_HASH UINT32_C(0x2caf1aa6)
 
 /* Numbers of functions and of data. */

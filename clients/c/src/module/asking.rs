@@ -151,11 +151,16 @@ thread_local! {
 /// the result, to be read from `reply`; it is there until the next such call, and empty when this fails. Waits for it
 /// at most `timeout_ns`, and all else of the module with it. The first call asks the other one what it offers.
 ///
+/// `interface` is the hash of the interface that the caller goes by: `MOTOR_HASH` of the header that
+/// `rohrpost interface generate --lang c` writes, or what `rohrpost_interface_hash` gives. Nothing is run by another
+/// one: `ROHRPOST_FAULT`, and the last error says that they differ.
+///
 /// # Safety
 /// The text is null or ends with a zero; `arguments` is null, or points to `len` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rohrpost_module_call(
     module: *const c_char,
+    interface: u32,
     function: u16,
     arguments: *const c_void,
     len: usize,
@@ -167,7 +172,7 @@ pub unsafe extern "C" fn rohrpost_module_call(
         // SAFETY: the caller's promise.
         let (module, arguments) = unsafe { (needed_text(module, "module")?, bytes(arguments, len, "arguments")?) };
         let timeout = Duration::from_nanos(timeout_ns);
-        asked(module, timeout, reply, |context, peer| context.call(peer, function, arguments, timeout))
+        asked(module, interface, timeout, reply, |context, peer| context.call(peer, function, arguments, timeout))
     })
 }
 
@@ -179,6 +184,7 @@ pub unsafe extern "C" fn rohrpost_module_call(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rohrpost_module_get(
     module: *const c_char,
+    interface: u32,
     number: u16,
     timeout_ns: u64,
     reply: Option<&mut MaybeUninit<Decoder>>,
@@ -188,20 +194,25 @@ pub unsafe extern "C" fn rohrpost_module_get(
         // SAFETY: the caller's promise.
         let module = unsafe { needed_text(module, "module") }?;
         let timeout = Duration::from_nanos(timeout_ns);
-        asked(module, timeout, reply, |context, peer| context.get(peer, number, timeout))
+        asked(module, interface, timeout, reply, |context, peer| context.get(peer, number, timeout))
     })
 }
 
-/// Asks another module; one that is another by now is asked anew what it offers the next time.
+/// Asks another module, if it has this interface; one that has another is asked anew what it offers the next time.
 fn asked(
     module: &str,
+    interface: u32,
     timeout: Duration,
     reply: &mut Decoder,
     ask: impl FnOnce(&mut NativeContext<'_>, &Rc<Peer>) -> Result<Vec<u8>, CallError>,
 ) -> Result<(), Code> {
     let result = with_context(|context| {
         let peer = context.peer(module, timeout).map_err(failed)?;
-        let result = ask(context, &peer);
+        let result = if peer.hash == interface {
+            ask(context, &peer)
+        } else {
+            Err(CallError::Fault(peer.name, Fault::InterfaceDiffers { server: peer.hash }))
+        };
         if let Err(CallError::Fault(_, Fault::InterfaceDiffers { .. })) = &result {
             context.forget(module);
         }
