@@ -14,8 +14,8 @@ use std::time::Duration;
 const BYTES_MAX: usize = 1 << 20;
 
 /// Puts a module's description together of its parts, all of which come within `timeout`. `elapsed` tells how much time
-/// has passed since this began; `ask` is told how many bytes are there and how much time is left, and returns what comes
-/// next.
+/// has passed since this began; `ask` is told how many bytes are there and how much time is left, and returns what
+/// comes next.
 ///
 /// ```
 /// use rohrpost_mailbox::Name;

@@ -58,7 +58,7 @@ fn modules(place: &Place) -> Vec<String> {
 /// The stream as the test reads it itself.
 struct Own {
     reader: StreamReader,
-    /// By how much the numbers of pictures are ahead of those of records, modulo 256, in each incarnation of the camera.
+    /// By how much numbers of pictures are ahead of those of records, modulo 256, in each incarnation of the camera.
     ahead: BTreeMap<u32, u8>,
 }
 
