@@ -25,7 +25,7 @@ class Player(rp.Module, klass="player"):
 
     @rp.every(0.02)
     @ends_when_it_fails
-    def begin(self) -> None:
+    def serve(self) -> None:
         # Subscriptions take a moment.
         if turn.is_ping and not self.has_begun:
             self.publish("ball", handshake)

@@ -155,7 +155,11 @@ fn python_client() -> Result<(), Failure> {
     whole.args(&install).current_dir(&folder).env("MATURIN_PEP517_ARGS", "--profile dev");
     cargo::run("installing the client in Python, with its part in Rust", &mut whole)?;
     run("asking it for modules on the node, which it has", &["-c", is_available, "yes"])?;
-    run("testing the client in Python, installed", &["-m", "unittest", "discover", "-t", ".", "-s", "tests"])
+    run("testing the client in Python, installed", &["-m", "unittest", "discover", "-t", ".", "-s", "tests"])?;
+    // As the tests of all have built it, with the command beside it.
+    let mut bench = Command::new(cargo::target().join("debug").join(BENCH));
+    bench.args(["languages", "--quick", "--only", "Python", "--python"]).arg(&python);
+    cargo::run("measuring it, quickly: each program of the bench in Python delivers", &mut bench)
 }
 
 /// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the

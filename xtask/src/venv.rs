@@ -13,8 +13,9 @@ const PACKAGE: &str = "rerun-sdk==0.36.3";
 /// The library of the makers of the format, in Python, with what it needs to decompress, and to decode protobuf.
 const MCAP_PACKAGES: &str = "mcap==1.6.0 mcap-protobuf-support==0.6.0 protobuf==7.36.2";
 
-/// What checks the types of the client in Python, and what builds its package, with and without Rust.
-const CLIENT_PACKAGES: &str = "mypy==1.13.0 hatchling==1.27.0 maturin==1.16.0";
+/// What checks the types of the client in Python, and what builds its package, with and without Rust; and numpy, since
+/// arrays are views of its records.
+const CLIENT_PACKAGES: &str = "mypy==1.13.0 hatchling==1.27.0 maturin==1.16.0 numpy==2.4.6";
 
 /// A Python with Rerun in it.
 pub(crate) struct Venv {

@@ -2,10 +2,10 @@
 
 use crate::calls::apart;
 use crate::fails::{failure, misuse};
-use crate::in_hand::{Hand, InHand, Way};
 use crate::lent::{is_forked, require_own_process, with};
 use crate::owned::{Owned, drop_left};
 use crate::plan::Plan;
+use crate::records::{Hand, Record, Way};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use rohrpost_native::schema::Field;
@@ -27,12 +27,12 @@ pub(crate) struct Stream {
     /// A record that was found, and is not read yet.
     found: Option<StayingRecord>,
     /// The record that is being read, or was, as long as it is in hand.
-    pub(crate) hand: Option<Hand>,
+    hand: Option<Hand>,
 }
 
 impl Stream {
     /// For the process that opened it.
-    pub(crate) fn borrowed<'py>(slf: &Bound<'py, Self>) -> PyResult<PyRefMut<'py, Self>> {
+    fn borrowed<'py>(slf: &Bound<'py, Self>) -> PyResult<PyRefMut<'py, Self>> {
         require_own_process(slf.py())?;
         // It fails while its own thread waits for a record.
         slf.try_borrow_mut().map_err(|_| misuse(slf.py(), &format!("a stream {OPENED_ELSEWHERE}")))
@@ -50,14 +50,14 @@ impl Stream {
     }
 
     /// The record that was found: it is in hand from now on.
-    pub(crate) fn take(&mut self) -> Option<StayingRecord> {
+    fn take(&mut self) -> Option<StayingRecord> {
         let found = self.found.take()?;
         self.hand = Some(Hand::of(found.info.sequence));
         Some(found)
     }
 
     /// Finds the newest record; whether there is one.
-    pub(crate) fn find_newest(&mut self, py: Python<'_>) -> PyResult<bool> {
+    fn find_newest(&mut self, py: Python<'_>) -> PyResult<bool> {
         let newest = self.own(py)?.newest().map_err(|error| failure(py, NativeError::Read(error)))?;
         Ok(self.keep(newest))
     }
@@ -110,7 +110,7 @@ impl Stream {
     fn in_hand(slf: Bound<'_, Self>, find: Option<Py<PyAny>>) -> PyResult<InHand> {
         let way = Self::borrowed(&slf)?.way.clone();
         let way = way.ok_or_else(|| misuse(slf.py(), "nothing says how this stream is read"))?;
-        Ok(InHand::new(slf.unbind(), way, find))
+        Ok(InHand { stream: slf.unbind(), way, find })
     }
 
     /// Finds the next record: whether it came in time, or how many were lost.
@@ -169,4 +169,57 @@ impl Stream {
         let missed = Self::borrowed(slf)?.own(slf.py())?.missed();
         Ok((missed.lost, missed.sampled, missed.passed_over))
     }
+}
+
+/// A record, from the beginning of a `with` to its end.
+#[pyclass(frozen, module = "rohrpost._node")]
+pub(crate) struct InHand {
+    stream: Py<Stream>,
+    way: Arc<Way>,
+    /// Finds it in the stream, or raises why not; none: it is the newest.
+    find: Option<Py<PyAny>>,
+}
+
+#[pymethods]
+impl InHand {
+    fn __enter__(&self, py: Python<'_>) -> PyResult<Record> {
+        let stream = self.stream.bind(py);
+        match &self.find {
+            Some(find) => drop(find.call0(py)?),
+            None if Stream::borrowed(stream)?.find_newest(py)? => {}
+            None => return Err(told(py, "streams", "no_newest", (&self.way.what,))),
+        }
+        let taken = Stream::borrowed(stream)?.take();
+        let record = taken.ok_or_else(|| misuse(py, "no record was found"))?;
+        let info = record.info;
+        let read = self.way.read(py, record.bytes);
+        // Not borrowed while code of an author ran.
+        let mut stream = Stream::borrowed(stream)?;
+        let (value, held) = read.inspect_err(|_| stream.hand = None)?;
+        stream.hand = Some(Hand::holding(info.sequence, held));
+        Ok(Record::new(value, info))
+    }
+
+    fn __exit__(
+        &self,
+        py: Python<'_>,
+        error: &Bound<'_, PyAny>,
+        _value: &Bound<'_, PyAny>,
+        _trace: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let hand = self.stream.bind(py).try_borrow_mut()?.hand.take();
+        match hand.map_or(Ok(None), |hand| hand.release(py))? {
+            Some(sequence) if error.is_none() => {
+                let what = format!("record {sequence} of {}", self.way.what);
+                Err(told(py, "views", "kept", (what,)))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// An exception that a function of `rohrpost.node` makes.
+fn told<'py>(py: Python<'py>, module: &str, function: &str, arguments: impl pyo3::call::PyCallArgs<'py>) -> PyErr {
+    let made = py.import(format!("rohrpost.node.{module}")).and_then(|it| it.getattr(function)?.call1(arguments));
+    made.map_or_else(|error| error, PyErr::from_value)
 }

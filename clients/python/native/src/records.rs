@@ -1,13 +1,10 @@
-//! A record in hand: from the beginning of a `with` of Python's to its end.
+//! Records of streams as Python has them in hand.
 
-use crate::fails::misuse;
 use crate::plan::{LentPart, Plan};
 use crate::shared::Shared;
-use crate::streams::Stream;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use rohrpost_native::{RecordPlace, StayingBytes};
-use std::sync::Arc;
+use rohrpost_native::{RecordInfo, RecordPlace, StayingBytes};
 
 /// A record in hand.
 #[pyclass(frozen, module = "rohrpost._node")]
@@ -24,6 +21,12 @@ pub(crate) struct Record {
     /// Its number in the stream.
     #[pyo3(get)]
     sequence: u64,
+}
+
+impl Record {
+    pub(crate) fn new(value: Py<PyAny>, info: RecordInfo) -> Self {
+        Self { value, time_ns: info.stamp.ns, epoch: info.stamp.epoch, sequence: info.sequence }
+    }
 }
 
 #[pymethods]
@@ -51,7 +54,7 @@ pub(crate) struct Hand {
     held: Held,
 }
 
-enum Held {
+pub(crate) enum Held {
     Nothing,
     Part(LentPart),
     /// What Python has read, and looks after.
@@ -64,8 +67,13 @@ impl Hand {
         Self { sequence, held: Held::Nothing }
     }
 
+    /// Of a record that was read.
+    pub(crate) fn holding(sequence: u64, held: Held) -> Self {
+        Self { sequence, held }
+    }
+
     /// It is held no more; the record's number, if something of its memory is kept.
-    fn release(self, py: Python<'_>) -> PyResult<Option<u64>> {
+    pub(crate) fn release(self, py: Python<'_>) -> PyResult<Option<u64>> {
         let is_free = match &self.held {
             Held::Nothing => true,
             Held::Part(part) => {
@@ -82,7 +90,8 @@ impl Hand {
 }
 
 impl Way {
-    fn read(&self, py: Python<'_>, bytes: StayingBytes) -> PyResult<(Py<PyAny>, Held)> {
+    /// The value of a record, and what Python has of its memory.
+    pub(crate) fn read(&self, py: Python<'_>, bytes: StayingBytes) -> PyResult<(Py<PyAny>, Held)> {
         let place = match bytes {
             StayingBytes::Ring(place) => place,
             StayingBytes::Journal(bytes) => return self.by_python(py, PyBytes::new(py, &bytes).into_any().unbind()),
@@ -108,63 +117,4 @@ impl Way {
         let held = self.held.call1(py, (data,))?;
         Ok((held.getattr(py, "value")?, Held::Python(held)))
     }
-}
-
-/// A record, from the beginning of a `with` to its end.
-#[pyclass(frozen, module = "rohrpost._node")]
-pub(crate) struct InHand {
-    stream: Py<Stream>,
-    way: Arc<Way>,
-    /// Finds it in the stream, or raises why not; none: it is the newest.
-    find: Option<Py<PyAny>>,
-}
-
-impl InHand {
-    pub(crate) fn new(stream: Py<Stream>, way: Arc<Way>, find: Option<Py<PyAny>>) -> Self {
-        Self { stream, way, find }
-    }
-}
-
-#[pymethods]
-impl InHand {
-    fn __enter__(&self, py: Python<'_>) -> PyResult<Record> {
-        let stream = self.stream.bind(py);
-        match &self.find {
-            Some(find) => drop(find.call0(py)?),
-            None if Stream::borrowed(stream)?.find_newest(py)? => {}
-            None => return Err(told(py, "streams", "no_newest", (&self.way.what,))),
-        }
-        let taken = Stream::borrowed(stream)?.take();
-        let record = taken.ok_or_else(|| misuse(py, "no record was found"))?;
-        let info = record.info;
-        let read = self.way.read(py, record.bytes);
-        // Not borrowed while code of an author ran.
-        let mut stream = Stream::borrowed(stream)?;
-        let (value, held) = read.inspect_err(|_| stream.hand = None)?;
-        stream.hand = Some(Hand { sequence: info.sequence, held });
-        Ok(Record { value, time_ns: info.stamp.ns, epoch: info.stamp.epoch, sequence: info.sequence })
-    }
-
-    fn __exit__(
-        &self,
-        py: Python<'_>,
-        error: &Bound<'_, PyAny>,
-        _value: &Bound<'_, PyAny>,
-        _trace: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
-        let hand = self.stream.bind(py).try_borrow_mut()?.hand.take();
-        match hand.map_or(Ok(None), |hand| hand.release(py))? {
-            Some(sequence) if error.is_none() => {
-                let what = format!("record {sequence} of {}", self.way.what);
-                Err(told(py, "views", "kept", (what,)))
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-/// An exception that a function of `rohrpost.node` makes.
-fn told<'py>(py: Python<'py>, module: &str, function: &str, arguments: impl pyo3::call::PyCallArgs<'py>) -> PyErr {
-    let made = py.import(format!("rohrpost.node.{module}")).and_then(|it| it.getattr(function)?.call1(arguments));
-    made.map_or_else(|error| error, PyErr::from_value)
 }
