@@ -17,7 +17,7 @@ pub enum Fault {
     /// The module is switched off.
     #[error("the module is off; switch it on first")]
     ModuleOff,
-    /// The module has stopped working; it takes no commands until it is switched off and on.
+    /// The module has stopped working; it takes no commands until it is switched on again.
     #[error("the module is in error: {}", line(.0))]
     ModuleError(String),
     /// It may have been run, or not: the server was restarted in between.

@@ -255,7 +255,7 @@ class Hosted:
         self._done(now_ns, command, False, result)
 
     def failed(self, error: BaseException) -> Fault:
-        """The module's own code has failed: it takes no commands until it is switched off and on."""
+        """The module's own code has failed: it takes no commands until it is switched on again."""
         text = plain(f"{type(error).__name__}: {error}")[:900]
         self.state, self.error = State.Error, text
         return Fault(faults.MODULE_ERROR, (text,))
