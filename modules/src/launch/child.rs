@@ -298,6 +298,12 @@ impl Child {
         node.state_of(self.name, self.process.as_ref()?.id())
     }
 
+    /// Times that it went into error, as it says itself.
+    pub(super) fn errors(&self, node: &Node) -> u32 {
+        let word = self.process.as_ref().and_then(|process| node.last_word_of(self.name, process.id()));
+        word.map_or(0, |word| word.errors)
+    }
+
     /// The number of the error that it says it is in.
     pub(super) fn in_error(&self, node: &Node) -> Option<u32> {
         let word = node.last_word_of(self.name, self.process.as_ref()?.id())?;

@@ -60,9 +60,9 @@ impl Health {
         in_error.filter(|_| self.present.is_none())
     }
 
-    /// Why it is in the error of this number.
-    pub(super) fn is_in_error(&mut self, number: u32, why: String) {
-        (self.error, self.present) = (why, Some(number));
+    /// Why it went into error, and into which one, if that is known.
+    pub(super) fn went_into_error(&mut self, number: Option<u32>, why: String) {
+        (self.error, self.present) = (why, number);
     }
 
     /// Its process has ended; if it failed, so.
@@ -113,15 +113,18 @@ mod tests {
         let mut health = Health::new(Duration::from_secs(1), Instant::now());
         let asked = [None, Some(1), Some(1)].map(|in_error| health.asks_why(in_error));
         assert_eq!(asked, [None, Some(1), Some(1)]);
-        health.is_in_error(1, "no port".into());
+        health.went_into_error(Some(1), "no port".into());
         assert_eq!(health.asks_why(Some(1)), None);
         assert_eq!(health.present_error(), Some("no port"));
         assert_eq!(health.asks_why(None), None);
         assert_eq!((health.present_error(), health.error()), (None, "no port"));
         assert_eq!(health.asks_why(Some(2)), Some(2));
-        health.is_in_error(2, "no power".into());
+        health.went_into_error(Some(2), "no power".into());
         assert_eq!(health.asks_why(Some(3)), Some(3), "no look came between the two");
         assert_eq!((health.present_error(), health.error()), (None, "no power"));
+        health.went_into_error(None, "no brakes".into());
+        assert_eq!((health.present_error(), health.error()), (None, "no brakes"));
+        assert_eq!(health.asks_why(Some(5)), Some(5), "that may be another one");
         health.ended(Some(&"ended with 1".into()));
         assert_eq!((health.present_error(), health.error()), (None, "ended with 1"));
     }

@@ -4,7 +4,7 @@
 use super::child::Child;
 use super::{Launch, LaunchError};
 use crate::call::{CallError, Fault};
-use crate::common::{self, Status};
+use crate::common::{self, State, Status};
 use crate::launcher::Phase;
 use crate::output::plain;
 use rohrpost_config::{Module, Scheduling as Wanted};
@@ -18,8 +18,8 @@ const ROUTER_RESTARTS_MAX: u32 = 8;
 /// Calls of launch to a module that are under way.
 #[derive(Clone, Default)]
 pub(super) struct UnderWay {
-    /// Switches it on.
-    pub(super) switch: Option<u32>,
+    /// Switches it on: the call, and how often it had been in error before.
+    pub(super) switch: Option<(u32, u32)>,
     /// Asks it why it is in error: the number of that error, and the call.
     why: Option<(u32, u32)>,
 }
@@ -153,28 +153,29 @@ impl Launch {
         let call = self.calls[index].switch.take();
         if child.phase() != Phase::Ready {
             // It ended meanwhile.
-            call.into_iter().for_each(|call| self.tool.link.forget(call));
+            call.into_iter().for_each(|(call, _)| self.tool.link.forget(call));
             return;
         }
+        let before = call.map_or(0, |(_, errors)| errors);
         let answer = match call {
             None if !child.wants_on() => Some(Ok(())),
             None => match self.tool.begin_switch(child.name(), true) {
-                Ok(call) => return self.calls[index].switch = Some(call),
+                Ok(call) => return self.calls[index].switch = Some((call, child.errors(&self.node))),
                 Err(error) => Some(Err(error)),
             },
-            Some(call) => {
+            Some((number, _)) => {
                 self.tool.link.collect();
-                let answer = self.tool.link.poll(call);
-                self.calls[index].switch = answer.is_none().then_some(call);
+                let answer = self.tool.link.poll(number);
+                self.calls[index].switch = call.filter(|_| answer.is_none());
                 answer
             }
         };
         let Some(answer) = answer else { return };
         child.runs(answer.is_ok());
-        if let Err(CallError::Fault(_, Fault::ModuleError(why))) = &answer
-            && let Some(error) = child.in_error(&self.node)
-        {
-            child.health().is_in_error(error, why.clone());
+        if let Err(CallError::Fault(_, Fault::ModuleError(why))) = &answer {
+            // It may be in a later one by now.
+            let number = child.in_error(&self.node).filter(|number| *number == before.wrapping_add(1));
+            child.health().went_into_error(number, why.clone());
         }
         // The lower layers know numbers only.
         let told = |error: CallError| error.to_string().replace(&child.name().to_string(), child.text());
@@ -200,9 +201,11 @@ impl Launch {
         self.tool.link.collect();
         match self.tool.link.poll_for(call, |bytes| postcard::from_bytes::<Status>(bytes)) {
             None => self.calls[index].why = Some((error, call)),
-            Some(Ok(status)) if !status.error.is_empty() => {
-                let note = format!("{} is in error: {}", child.text(), plain::line(&status.error));
-                child.health().is_in_error(error, status.error);
+            // Of this error, if it is in no later one even now.
+            Some(Ok(status)) if status.state == State::Error && child.in_error(&self.node) == Some(error) => {
+                let why = if status.error.is_empty() { "it does not say why".into() } else { status.error };
+                let note = format!("{} is in error: {}", child.text(), plain::line(&why));
+                child.health().went_into_error(Some(error), why);
                 self.note(Some(note));
             }
             Some(_) => {}
