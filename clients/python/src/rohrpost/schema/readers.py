@@ -155,7 +155,7 @@ class _Maker:
         names = [field.name for field in named.fields]
         if named.kind == 0:
             return _Made(nothing if python is None else _made_of_nothing(python), 0, True)
-        make = _payload(named) if python is None else _called(python, names)
+        make = _payload(named) if python is None else called(python, names)
         return _together(_several([it.part for it in inners], make), inners)
 
     def _enum(self, type: Enum, depth: int) -> _Made:
@@ -205,7 +205,7 @@ def _payload(named: Named) -> Callable[..., Any]:
     return lambda *values: dict(zip(names, values))
 
 
-def _called(python: Any, names: list[str]) -> Callable[..., Any]:
+def called(python: Any, names: list[str]) -> Callable[..., Any]:
     """By position, which is quicker, where that says the same."""
     try:
         takes = list(inspect.signature(python).parameters.values())
