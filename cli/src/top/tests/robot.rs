@@ -183,6 +183,7 @@ fn module(installation: &Installation, at_ns: u64, counts: &Counts) -> ModuleSur
         pid: 14_700 + u32::from(name.class().0),
         incarnation: 7,
         state: Some(state),
+        errors: 0,
         restarts: u32::from(counts.module == "pilot.0"),
         joined_ns: 0,
         in_hand: None,
