@@ -153,6 +153,8 @@ impl Sender {
     ///
     /// # Errors
     /// When it was not accepted.
+    // Put into its callers, which know how many parts there are.
+    #[inline(always)]
     pub fn send(&mut self, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
         let len = match parts {
             [all] => all.len(),
