@@ -153,11 +153,10 @@ impl Sender {
     ///
     /// # Errors
     /// When it was not accepted.
+    // Put into its callers, which know how many parts there are.
+    #[inline(always)]
     pub fn send(&mut self, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
-        let len = match parts {
-            [all] => all.len(),
-            parts => parts.iter().map(|part| part.len()).sum(),
-        };
+        let len = parts.iter().map(|part| part.len()).sum();
         let mut claim = match self.claim(label.priority, Some(label), len) {
             Ok(claim) => claim,
             Err(error) => return Err(self.refused(label, error)),
