@@ -78,8 +78,8 @@ static void receive(uint8_t *message) {
     if (package.len != bytes) {
         fail("length", package.len, bytes);
     }
-    // It stays in hand until the next call, which gives it back: so do programs in C that have no reason to be earlier.
     memcpy(message, package.body, bytes);
+    done(rohrpost_receiver_release(receiver), "release");
 }
 
 static void send_message(const uint8_t *message) {
