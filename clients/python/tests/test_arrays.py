@@ -68,7 +68,7 @@ class Arrays(unittest.TestCase):
         self.assertEqual(told["grey"], [0, 2, 128, 48 * 128 - 2], "every second column, of each row")
         self.assertEqual((told["flat"], told["mine"], told["metres"]), (["uint8", [6144]], [0, 2, 4], 0.5))
         self.assertFalse(told["is copied"])
-        self.assertEqual((told["kinds"], told["pair"]), ([True] * 4, [True, "memoryview"]))
+        self.assertEqual((told["kinds"], told["pair"]), ([0, 1], [True, "memoryview"]))
         self.assertEqual(told["calls"], ["newest", "__init__"], "all else of a picture is done by Rust")
         self.assertRegex(told["write"], "^ValueError: assignment destination is read-only")
         self.assertRegex(told["kept"], "^Misuse: a view of record [0-9]+ of `image` of camera.0 is kept")
