@@ -216,6 +216,8 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         keep(None)
         told.append(f"failed: {said(lambda: seen(keep_and_fail))}")
         keep(None)
+        told.append(f"object: {said(lambda: seen(lambda pixels: keep(pixels.obj)))}")
+        told.append(f"of it: {said(lambda: memoryview(self.kept))}")
         told.append(f"circle: {said(lambda: seen(circle))}")
         told.append(f"write: {said(lambda: seen(lambda pixels: pixels.__setitem__(0, 1)))}")
         newest = camera.newest()
@@ -276,7 +278,14 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
                 if not keeps:
                     raise RuntimeError("no")
 
-        return [*told, said(lambda: given_up(False)), said(lambda: given_up(True))]
+        def finished() -> None:
+            with self.begin("object", Note("finished", b""), 5000) as room:
+                room[:] = bytes(5000)
+                self.kept = room.obj
+
+        told += [f"object: {said(finished)}", f"of it: {said(lambda: memoryview(self.kept))}"]
+        told += [said(lambda: given_up(False)), said(lambda: given_up(True))]
+        return told
 
     @rp.stream(3)
     def note(self) -> "Note":
@@ -285,6 +294,10 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
     @rp.stream(4)
     def wide(self) -> "Note":
         """The same, with more room."""
+
+    @rp.stream(5)
+    def object(self) -> "Note":
+        """As much again."""
 
     @rp.command(25)
     def sees(self) -> rp.U32:

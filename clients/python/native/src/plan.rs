@@ -46,11 +46,11 @@ pub(crate) struct LentPart {
 }
 
 impl LentPart {
-    /// Closes the view; whether nobody has any part of it.
+    /// Closes the view, and lets nobody have another; whether nobody has any part of it.
     pub(crate) fn release(&self, py: Python<'_>) -> bool {
         // It fails where something has the view itself, which is a view that is left.
         let _ = self.view.call_method0(py, pyo3::intern!(py, "release"));
-        self.shared.is_free(py)
+        self.shared.end(py)
     }
 }
 

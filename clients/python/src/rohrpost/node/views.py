@@ -50,14 +50,16 @@ class View:
         return self._is_free()
 
     def _is_free(self) -> bool:
-        for view in reversed(self._lent):
-            try:
+        try:
+            for view in reversed(self._lent):
                 view.release()
-            except BufferError:  # An array of numpy is made of it, say.
-                return False
-        self._lent.clear()
-        self.__dict__.pop("whole", None)
-        return not self._shared.views
+        except BufferError:  # An array of numpy is made of it, say.
+            pass
+        else:
+            self._lent.clear()
+            self.__dict__.pop("whole", None)
+        # From now on, it makes no new ones: what has it, as `view.obj`, has no way to another record.
+        return self._shared.end()
 
 
 class Held:
