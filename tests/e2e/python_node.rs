@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 const FAULTY: &str = include_str!("python/faulty.py");
+const MEDDLING: &str = include_str!("python/meddling.py");
 /// Those of the faulty program whose records lie in place.
 const STREAMS: &str = "[module.stream.wide]\nrecord = \"64 KiB\"\n[module.stream.object]\nrecord = \"64 KiB\"\n";
 const OVER: &str = "of it: BufferError: the record of these bytes is in hand no more";
@@ -289,10 +290,46 @@ fn a_view_that_outlives_its_record_is_told_and_leads_nowhere_else() {
         "picky 1: BadReply: ",
         "`odometry` of odometry.0: its class does not take it: ValueError: too far",
         "laser: dict",
-        "meanwhile: {' opened in another thread, that of its module, which alone may read it'}",
+        "meanwhile: {'Misuse: `image` of camera.0 was opened in another thread, that of its module, which alone may \
+         read it'}",
     ] {
         assert!(keeps.contains(words), "{words}: {keeps}");
     }
+    scene.stop();
+}
+
+#[test]
+fn a_record_is_let_go_by_its_own_with_alone_and_by_that_for_sure() {
+    let mut scene = Scene::launched(MEDDLING, "mood = \"good\"");
+    scene.robot.wait_on(&mut scene.launch);
+    let in_hand = "Misuse: a record of `odometry` of odometry.0 is in hand; leave its `with`";
+    let not_in_hand = "Misuse: this `with` has no record of `odometry` of odometry.0 in hand";
+    let meddles = answers(&scene, "meddles");
+    for words in [
+        &format!("exit: {not_in_hand}"),
+        &format!("enter: {in_hand}"),
+        "read: Meddling",
+        &format!("other: {not_in_hand}"),
+        &format!("still: {in_hand}"),
+        "thread: Misuse: `odometry` of odometry.0 was opened in another thread",
+        &format!("over: {not_in_hand}"),
+        "left: SystemExit: at once",
+        "equal: True, False",
+        "stale: Misuse: the record of `odometry` of odometry.0 that was found is gone",
+    ] {
+        assert!(meddles.contains(words), "{words}: {meddles}");
+    }
+    let keeps = answers(&scene, "keeps");
+    for words in [
+        "hoarded: Misuse: a view of record ",
+        "failed: ValueError: its own, collected 0 times",
+        "circle: Misuse: a view of record ",
+        "`numpy.array(…)`, collected 1 times",
+        "collected: no exception, but None",
+    ] {
+        assert!(keeps.contains(words), "{words}: {keeps}");
+    }
+    assert!(answers(&scene, "circles").contains("reader: None"), "{}", answers(&scene, "circles"));
     scene.stop();
 }
 

@@ -205,10 +205,13 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
 
         def pester() -> None:
             while not is_over.is_set():
-                pestered.add(said(camera.missed).split(" was")[-1])
+                pestered.add(said(camera.missed))
 
-        with camera.next(timeout_s=20):
-            pass
+        def pass_by() -> None:
+            with camera.next(timeout_s=20):
+                pass
+
+        pass_by()
         told = [f"slice: {said(lambda: seen(lambda pixels: keep(pixels[1:])))}"]
         told.append(f"still there: {len(bytes(self.kept)) > 1000}")
         keep(None)
@@ -234,8 +237,7 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         thread.start()
         # More than are there by now, so that it waits.
         for _ in range(15):
-            said(lambda: camera.next(timeout_s=20).__enter__())
-            newest.__exit__(None, None, None)
+            said(pass_by)
         is_over.set()
         thread.join()
         return [*told, f"meanwhile: {pestered}"]

@@ -122,10 +122,8 @@ impl Methods {
 
 fn class(py: Python<'_>) -> PyResult<Py<PyAny>> {
     // The class has copies of these, or of what is in them, but of the names.
-    let mut members = [
-        member(c"length", offset_of!(Object, length), c"How many there are."),
-        ffi::PyMemberDef::default(),
-    ];
+    let mut members =
+        [member(c"length", offset_of!(Object, length), c"How many there are."), ffi::PyMemberDef::default()];
     let slot = |slot, pfunc| ffi::PyType_Slot { slot, pfunc };
     let mut slots = [
         slot(ffi::Py_bf_getbuffer, get_buffer as *mut c_void),
