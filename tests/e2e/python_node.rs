@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 
 const FAULTY: &str = include_str!("python/faulty.py");
 const MEDDLING: &str = include_str!("python/meddling.py");
-/// Those of the faulty program whose records lie in place.
+/// Streams of the faulty program, with room for records that lie in place.
 const STREAMS: &str = "[module.stream.wide]\nrecord = \"64 KiB\"\n[module.stream.object]\nrecord = \"64 KiB\"\n";
 const OVER: &str = "of it: BufferError: the record of these bytes is in hand no more";
 const PAGE: &str = include_str!("../../docs/src/python-node.md");

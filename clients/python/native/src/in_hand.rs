@@ -2,7 +2,7 @@
 
 use crate::fails::misuse;
 use crate::records::{Held, Record, Way};
-use crate::streams::Stream;
+use crate::seat::Stream;
 use pyo3::PyTraverseError;
 use pyo3::prelude::*;
 use pyo3::pyclass::PyVisit;

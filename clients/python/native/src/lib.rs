@@ -17,6 +17,7 @@ mod owned;
 mod plan;
 mod publishing;
 mod records;
+mod seat;
 mod shared;
 mod streams;
 mod values;
@@ -40,7 +41,9 @@ mod _node {
     #[pymodule_export]
     use crate::records::Record;
     #[pymodule_export]
-    use crate::streams::{Stream, open_stream};
+    use crate::seat::Stream;
+    #[pymodule_export]
+    use crate::streams::open_stream;
     #[pymodule_export]
     use crate::watching::{unwatch, watch};
 }
