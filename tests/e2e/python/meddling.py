@@ -147,11 +147,14 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
     @rp.command(18)
     def circles(self) -> list[str]:
         """A reader that leads to itself by way of how it reads."""
-        reader = self.stream("odometry.0", "odometry", timeout_s=20)
-        kept = reader
-        reader._stream.reads("it", ("words", [lambda: kept]), lambda data: kept)
-        seen = weakref.ref(reader)
-        del reader, kept
+
+        def opened() -> weakref.ref:
+            reader = self.stream("odometry.0", "odometry", timeout_s=20)
+            reader._stream.reads("it", ("words", [lambda: reader]), lambda data: reader)
+            reader._newest = reader._stream.in_hand(lambda: reader)
+            return weakref.ref(reader)
+
+        seen = opened()
         gc.collect()
         return [f"reader: {seen()}"]
 
