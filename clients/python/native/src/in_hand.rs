@@ -1,7 +1,7 @@
 //! A record of a stream, from the beginning of a `with` to its end.
 
 use crate::fails::misuse;
-use crate::records::{Held, Record, Way};
+use crate::records::{Hand, Held, Record, Way};
 use crate::seat::Stream;
 use pyo3::PyTraverseError;
 use pyo3::prelude::*;
@@ -38,6 +38,11 @@ impl InHand {
             None => Err(misuse(py, &format!("the record of {} that was found is gone", self.way.get().what))),
         }
     }
+
+    /// What is in its hand, and is so no more.
+    fn let_go(&self) -> Option<Hand> {
+        self.stream.get().let_go(self.number.swap(0, Ordering::Relaxed))
+    }
 }
 
 #[pymethods]
@@ -47,14 +52,23 @@ impl InHand {
         let info = record.info;
         // It may run code of an author.
         let (value, held) = self.way.get().read(py, record.bytes)?;
-        let record = Py::new(py, Record::new(value, info))?;
-        let number = entering.read(held).map_err(|left| {
-            drop(left);
-            misuse(py, &format!("a record of {} was let go while it was being read", self.way.get().what))
-        })?;
-        // ORDERING: Relaxed, here and below; the interpreter's lock orders it.
+        let number = match entering.read(held) {
+            Ok(number) => number,
+            Err(left) => {
+                left.release(py, false)?;
+                let what = &self.way.get().what;
+                return Err(misuse(py, &format!("a record of {what} was let go while it was being read")));
+            }
+        };
+        // ORDERING: Relaxed, as in `let_go`; the interpreter's lock orders it.
         self.number.store(number, Ordering::Relaxed);
-        Ok(record)
+        let made = Py::new(py, Record::new(value, info));
+        if made.is_err()
+            && let Some(hand) = self.let_go()
+        {
+            hand.release(py, false)?;
+        }
+        made
     }
 
     fn __exit__(
@@ -64,7 +78,7 @@ impl InHand {
         _value: &Bound<'_, PyAny>,
         _trace: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let Some(hand) = self.stream.get().let_go(self.number.swap(0, Ordering::Relaxed)) else {
+        let Some(hand) = self.let_go() else {
             return Err(misuse(py, &format!("this `with` has no record of {} in hand", self.way.get().what)));
         };
         let is_told = error.is_none();

@@ -90,24 +90,32 @@ pub(crate) struct Held {
 impl Hand {
     /// It is held no more; the record's number, if something of its memory is kept. `is_told`: it matters.
     pub(crate) fn release(self, py: Python<'_>, is_told: bool) -> PyResult<Option<u64>> {
-        let Some(Held { parts, python }) = self.held else { return Ok(None) };
-        let is_free = || parts.iter().filter(|part| !part.release(py)).count() == 0;
-        let mut all_free = is_free();
-        if !all_free && is_told {
-            // What nothing leads to any more may wait for it, such as an exception in a local of its frame.
-            py.import("gc")?.call_method0("collect")?;
-            all_free = is_free();
-        }
-        if let Some(python) = python {
-            all_free &= python.call_method1(py, "release", (is_told,))?.extract::<bool>(py)?;
-        }
-        Ok((!all_free).then_some(self.sequence))
+        let is_free = self.held.map_or(Ok(true), |held| held.release(py, is_told))?;
+        Ok((!is_free).then_some(self.sequence))
     }
 
     pub(crate) fn visit(&self, visit: &PyVisit<'_>) -> Result<(), PyTraverseError> {
         let Some(Held { parts, python }) = &self.held else { return Ok(()) };
         parts.iter().try_for_each(|part| part.visit(visit))?;
         visit.call(python)
+    }
+}
+
+impl Held {
+    /// It is held no more; whether nothing of its memory is kept, if that `is_told`.
+    pub(crate) fn release(self, py: Python<'_>, is_told: bool) -> PyResult<bool> {
+        let Self { parts, python } = self;
+        let are_free = || parts.iter().filter(|part| !part.release(py)).count() == 0;
+        let mut is_free = are_free();
+        if !is_free && is_told {
+            // What nothing leads to any more may wait for it, such as an exception in a local of its frame.
+            py.import("gc")?.call_method0("collect")?;
+            is_free = are_free();
+        }
+        if let Some(python) = python {
+            is_free &= python.call_method1(py, "release", (is_told,))?.extract::<bool>(py)?;
+        }
+        Ok(is_free)
     }
 }
 

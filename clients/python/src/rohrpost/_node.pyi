@@ -29,6 +29,7 @@ class Record:
     @property
     def sequence(self) -> int:
         """Its number in the stream."""
+    def __eq__(self, other: object, /) -> bool: ...
 
 class InHand:
     """A record, from the beginning of a ``with`` to its end."""

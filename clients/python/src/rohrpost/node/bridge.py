@@ -164,7 +164,7 @@ class Bridge(NodeHost):
     def command(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
         """Runs a function: its result; or none, whether the arguments are to blame, and why."""
         answer = self._answered(number, arguments)
-        left = self._settled(None)
+        left = self._settled(answer[2] if answer[0] is None else None)
         return answer if left is None or answer[0] is None else (None, False, left)
 
     def _answered(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
