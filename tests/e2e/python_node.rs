@@ -8,6 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 const FAULTY: &str = include_str!("python/faulty.py");
+const MEDDLING: &str = include_str!("python/meddling.py");
+/// Streams of the faulty program, with room for records that lie in place.
+const STREAMS: &str = "[module.stream.wide]\nrecord = \"64 KiB\"\n[module.stream.object]\nrecord = \"64 KiB\"\n";
+const OVER: &str = "of it: BufferError: the record of these bytes is in hand no more";
 const PAGE: &str = include_str!("../../docs/src/python-node.md");
 const CONFIG: &str = r#"
 installation = "test"
@@ -75,7 +79,7 @@ pub(crate) fn package(place: &Place) -> PathBuf {
 
 /// With a section for each stream that this program has.
 fn configured(map: &str, settings: &str, code: &str) -> String {
-    let streams = if code == FAULTY { "[module.stream.wide]\nrecord = \"64 KiB\"\n" } else { "" };
+    let streams = if code == FAULTY { STREAMS } else { "" };
     CONFIG.replace("MAP", map).replace("SETTINGS", settings).replace("STREAMS", streams)
 }
 
@@ -244,13 +248,13 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
     wait("it hears", || answers(&scene, "heard_word").contains("tick, Misuse: -1 is no open").then_some(()));
     let notes = answers(&scene, "notes");
     for words in
-        ["Misuse: a record is being filled", "RuntimeError: no", "Misuse: a view of a record of `wide` that is"]
+        ["Misuse: a record is being filled", "RuntimeError: no", "Misuse: a view of a record of `wide` that is", OVER]
     {
         assert!(notes.contains(words), "{words}: {notes}");
     }
     let noted = scene.says(&["stream", "read", "gripper.0", "note"]).ok();
     assert!(noted.contains("{words: \"filled\", more: [97, 98, 99, 100]}"), "{noted}");
-    assert_eq!((scene.written("note"), scene.written("wide")), (2, 0));
+    assert_eq!((scene.written("note"), scene.written("wide"), scene.written("object")), (2, 0, 1));
     let looks = answers(&scene, "looks");
     for words in [
         "memoryview of ",
@@ -276,6 +280,8 @@ fn a_view_that_outlives_its_record_is_told_and_leads_nowhere_else() {
         "still there: True",
         "whole: Misuse: a view of record ",
         "failed: ValueError: its own",
+        "object: no exception, but None",
+        OVER,
         "circle: no exception, but None",
         "write: TypeError: cannot modify read-only memory",
         "twice: Misuse: a record of `image` of camera.0 is in hand; leave its `with` before another is read",
@@ -284,10 +290,46 @@ fn a_view_that_outlives_its_record_is_told_and_leads_nowhere_else() {
         "picky 1: BadReply: ",
         "`odometry` of odometry.0: its class does not take it: ValueError: too far",
         "laser: dict",
-        "meanwhile: {' opened in another thread, that of its module, which alone may read it'}",
+        "meanwhile: {'Misuse: `image` of camera.0 was opened in another thread, that of its module, which alone may \
+         read it'}",
     ] {
         assert!(keeps.contains(words), "{words}: {keeps}");
     }
+    scene.stop();
+}
+
+#[test]
+fn a_record_is_let_go_by_its_own_with_alone_and_by_that_for_sure() {
+    let mut scene = Scene::launched(MEDDLING, "mood = \"good\"");
+    scene.robot.wait_on(&mut scene.launch);
+    let in_hand = "Misuse: a record of `odometry` of odometry.0 is in hand; leave its `with`";
+    let not_in_hand = "Misuse: this `with` has no record of `odometry` of odometry.0 in hand";
+    let meddles = answers(&scene, "meddles");
+    for words in [
+        &format!("exit: {not_in_hand}"),
+        &format!("enter: {in_hand}"),
+        "read: Meddling",
+        &format!("other: {not_in_hand}"),
+        &format!("still: {in_hand}"),
+        "thread: Misuse: `odometry` of odometry.0 was opened in another thread",
+        &format!("over: {not_in_hand}"),
+        "left: SystemExit: at once",
+        "equal: True, False",
+        "stale: Misuse: the record of `odometry` of odometry.0 that was found is gone",
+    ] {
+        assert!(meddles.contains(words), "{words}: {meddles}");
+    }
+    let keeps = answers(&scene, "keeps");
+    for words in [
+        "hoarded: Misuse: a view of record ",
+        "failed: ValueError: its own, collected 0 times",
+        "circle: Misuse: a view of record ",
+        "`numpy.array(…)`, collected 1 times",
+        "collected: no exception, but None",
+    ] {
+        assert!(keeps.contains(words), "{words}: {keeps}");
+    }
+    assert!(answers(&scene, "circles").contains("reader: None"), "{}", answers(&scene, "circles"));
     scene.stop();
 }
 

@@ -147,12 +147,7 @@ class Looker(rp.Module, klass="looker"):
         told["mine"] = mine[0, :3].tolist()
         with depths.newest() as record:
             told["metres"] = round(float(numpy.frombuffer(record.value.pixels, numpy.float32).mean()), 3)
-        calls: list[str] = []
-        sys.setprofile(lambda frame, event, _: calls.append(frame.f_code.co_name) if event == "call" else None)
-        with images.newest() as record:
-            len(record.value.pixels)
-        sys.setprofile(None)
-        told["calls"] = calls
+        told["calls"] = self.calls(images) + self.calls(pairs)
         seen: set[int] = set()
         while len(seen) < len(ALL_KINDS):
             # Some are lost where this is slow.
@@ -168,6 +163,15 @@ class Looker(rp.Module, klass="looker"):
         Path(f"{FILE}.new").write_text(json.dumps(told))
         os.rename(f"{FILE}.new", FILE)
         os.kill(os.getpid(), signal.SIGTERM)
+
+    def calls(self, stream: Any) -> list[str]:
+        """What of a reading is Python."""
+        calls: list[str] = []
+        sys.setprofile(lambda frame, event, _: calls.append(frame.f_code.co_name) if event == "call" else None)
+        with stream.newest() as record:
+            repr(type(record.value))
+        sys.setprofile(None)
+        return calls
 
     def keep(self, stream: Any, is_kept: bool = True) -> None:
         with stream.newest() as record:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 
 class Memory(bytearray):
-    """As ``rohrpost._node.Shared``, but for its being writable."""
+    """As ``rohrpost._node.Shared``, but for its being writable, and for new views after its end."""
 
     @property
     def length(self) -> int:
         return len(self)
 
-    @property
-    def views(self) -> int:
-        """At least so many."""
+    def end(self) -> bool:
+        """Whether no view is left."""
         try:
             self.append(0)
         except BufferError:
-            return 1
+            return False
         del self[-1]
-        return 0
+        return True

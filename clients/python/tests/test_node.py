@@ -7,6 +7,7 @@ import threading
 import unittest
 from collections.abc import Callable
 from typing import Any, Optional, cast
+from unittest import mock
 
 import rohrpost as rp
 from rohrpost.node.failures import call_failure, words_of
@@ -104,6 +105,12 @@ class Nodes(unittest.TestCase):
         lent = pickle.PickleBuffer(held.value.pixels)
         self.assertFalse(held.release(), "somebody else has it, as an array of numpy would")
         self.assertEqual(lent.raw()[:3], pixels[:3])
+        held = Held(type_of(rp.Image), cast(Any, memory))
+        kept = held.value.pixels[1:3]
+        with mock.patch("gc.collect") as collect:
+            self.assertFalse(held.release(is_told=False))
+        collect.assert_not_called()
+        self.assertEqual(len(kept), 2)
 
     def test_short_bytes_are_copied_and_wrong_ones_refused(self) -> None:
         held = Held(type_of(bytes), cast(Any, Memory(b"\3abc")))

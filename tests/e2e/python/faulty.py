@@ -205,10 +205,13 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
 
         def pester() -> None:
             while not is_over.is_set():
-                pestered.add(said(camera.missed).split(" was")[-1])
+                pestered.add(said(camera.missed))
 
-        with camera.next(timeout_s=20):
-            pass
+        def pass_by() -> None:
+            with camera.next(timeout_s=20):
+                pass
+
+        pass_by()
         told = [f"slice: {said(lambda: seen(lambda pixels: keep(pixels[1:])))}"]
         told.append(f"still there: {len(bytes(self.kept)) > 1000}")
         keep(None)
@@ -216,6 +219,8 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         keep(None)
         told.append(f"failed: {said(lambda: seen(keep_and_fail))}")
         keep(None)
+        told.append(f"object: {said(lambda: seen(lambda pixels: keep(pixels.obj)))}")
+        told.append(f"of it: {said(lambda: memoryview(self.kept))}")
         told.append(f"circle: {said(lambda: seen(circle))}")
         told.append(f"write: {said(lambda: seen(lambda pixels: pixels.__setitem__(0, 1)))}")
         newest = camera.newest()
@@ -232,8 +237,7 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         thread.start()
         # More than are there by now, so that it waits.
         for _ in range(15):
-            said(lambda: camera.next(timeout_s=20).__enter__())
-            newest.__exit__(None, None, None)
+            said(pass_by)
         is_over.set()
         thread.join()
         return [*told, f"meanwhile: {pestered}"]
@@ -276,7 +280,14 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
                 if not keeps:
                     raise RuntimeError("no")
 
-        return [*told, said(lambda: given_up(False)), said(lambda: given_up(True))]
+        def finished() -> None:
+            with self.begin("object", Note("finished", b""), 5000) as room:
+                room[:] = bytes(5000)
+                self.kept = room.obj
+
+        told += [f"object: {said(finished)}", f"of it: {said(lambda: memoryview(self.kept))}"]
+        told += [said(lambda: given_up(False)), said(lambda: given_up(True))]
+        return told
 
     @rp.stream(3)
     def note(self) -> "Note":
@@ -285,6 +296,10 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
     @rp.stream(4)
     def wide(self) -> "Note":
         """The same, with more room."""
+
+    @rp.stream(5)
+    def object(self) -> "Note":
+        """As much again."""
 
     @rp.command(25)
     def sees(self) -> rp.U32:

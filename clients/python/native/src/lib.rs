@@ -11,11 +11,13 @@
 mod bridge;
 mod calls;
 mod fails;
+mod in_hand;
 mod lent;
 mod owned;
 mod plan;
 mod publishing;
 mod records;
+mod seat;
 mod shared;
 mod streams;
 mod values;
@@ -31,13 +33,17 @@ mod _node {
     #[pymodule_export]
     use crate::calls::{call, forget, get, peer};
     #[pymodule_export]
+    use crate::in_hand::InHand;
+    #[pymodule_export]
     use crate::lent::forked;
     #[pymodule_export]
     use crate::publishing::{abandon, begin, finish, follow, now, publish, say, set_parameter, set_period};
     #[pymodule_export]
     use crate::records::Record;
     #[pymodule_export]
-    use crate::streams::{InHand, Stream, open_stream};
+    use crate::seat::Stream;
+    #[pymodule_export]
+    use crate::streams::open_stream;
     #[pymodule_export]
     use crate::watching::{unwatch, watch};
 }

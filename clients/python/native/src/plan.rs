@@ -2,9 +2,12 @@
 //!
 //! Python makes the plan of a type once (`rohrpost.node.plans`), and reads itself what has none.
 
+use crate::lent::is_forked;
 use crate::shared::Shared;
+use pyo3::PyTraverseError;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
+use pyo3::pyclass::PyVisit;
 use pyo3::types::{PyBytes, PyFloat, PyString, PyTuple};
 use rohrpost_native::RecordPlace;
 
@@ -46,11 +49,16 @@ pub(crate) struct LentPart {
 }
 
 impl LentPart {
-    /// Closes the view; whether nobody has any part of it.
+    /// Closes the view, and lets nobody have another; whether nobody has any part of it.
     pub(crate) fn release(&self, py: Python<'_>) -> bool {
         // It fails where something has the view itself, which is a view that is left.
         let _ = self.view.call_method0(py, pyo3::intern!(py, "release"));
-        self.shared.is_free(py)
+        self.shared.end(py)
+    }
+
+    /// What it has refers to nothing more that has a part in cycles.
+    pub(crate) fn visit(&self, visit: &PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.view)
     }
 }
 
@@ -75,28 +83,36 @@ impl Plan {
         })
     }
 
-    /// The value that all of a record is, which is held, and what was lent of it; none: Python is to read it, or to say
-    /// what is wrong with it.
+    /// The value that all of a record is; none: Python is to read it, or to say what is wrong with it. What was lent of
+    /// the record is put into `lent` in each case.
+    ///
+    /// The record is in hand, its `Hand` without a `Held`, until this returns.
     pub(crate) fn read<'py>(
         &self,
         py: Python<'py>,
         place: &RecordPlace,
-    ) -> PyResult<Option<(Bound<'py, PyAny>, Option<LentPart>)>> {
-        // SAFETY: so many bytes of a mapping that `place` keeps. The record is held: its writer goes round it.
+        lent: &mut Vec<LentPart>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        // SAFETY: so many bytes of a mapping that `place` keeps. The record is held, so its writer goes round it: while
+        // it is being read, `Stream::let_go` does not let it go, and `Stream::read_once` reads no other, whatever an
+        // author's class does; and in a child that it forks, nothing more is read.
         let bytes = unsafe { std::slice::from_raw_parts(place.address().as_ptr(), place.len()) };
-        let mut reading = Reading { py, place, bytes, at: 0, lent: None };
-        let error = match reading.value(self) {
-            Ok(value) if reading.at == bytes.len() => return Ok(Some((value, reading.lent))),
-            Ok(_) => Unread::Bytes,
-            Err(error) => error,
-        };
-        if let Some(part) = reading.lent {
-            // An author's class may have kept it, and knows no record.
-            part.release(py);
+        let mut reading = Reading { py, place, bytes, at: 0, lent };
+        match reading.value(self) {
+            Ok(value) if reading.at == bytes.len() => Ok(Some(value)),
+            Err(Unread::Raised(error)) if !error.is_instance_of::<PyException>(py) => Err(error),
+            Ok(_) | Err(Unread::Raised(_) | Unread::Bytes) => Ok(None),
         }
-        match error {
-            Unread::Raised(error) if !error.is_instance_of::<PyException>(py) => Err(error),
-            Unread::Raised(_) | Unread::Bytes => Ok(None),
+    }
+
+    pub(crate) fn visit(&self, visit: &PyVisit<'_>) -> Result<(), PyTraverseError> {
+        match self {
+            Self::Words(words) => words.iter().try_for_each(|word| visit.call(word)),
+            Self::Struct(make, parts) => {
+                visit.call(make)?;
+                parts.iter().try_for_each(|part| part.visit(visit))
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -106,7 +122,7 @@ struct Reading<'a, 'py> {
     place: &'a RecordPlace,
     bytes: &'a [u8],
     at: usize,
-    lent: Option<LentPart>,
+    lent: &'a mut Vec<LentPart>,
 }
 
 impl<'a, 'py> Reading<'a, 'py> {
@@ -137,7 +153,12 @@ impl<'a, 'py> Reading<'a, 'py> {
             }
             Plan::Struct(make, parts) => {
                 let values = parts.iter().map(|part| self.value(part)).collect::<Result<Vec<_>, _>>()?;
-                make.bind(py).call1(PyTuple::new(py, values)?)?
+                let made = make.bind(py).call1(PyTuple::new(py, values)?)?;
+                if is_forked() {
+                    // It came back in a child, for which nobody holds the record.
+                    return Err(Unread::Bytes);
+                }
+                made
             }
         })
     }
@@ -147,12 +168,9 @@ impl<'a, 'py> Reading<'a, 'py> {
         if (bytes.len() as u64) < viewed_min {
             return Ok(PyBytes::new(self.py, bytes).into_any());
         }
-        if self.lent.is_some() {
-            return Err(Unread::Bytes);
-        }
         let shared = Shared::new(self.py, self.place.clone(), self.at - bytes.len()..self.at, true)?;
         let view = shared.view(self.py)?;
-        self.lent = Some(LentPart { shared, view: view.clone().unbind() });
+        self.lent.push(LentPart { shared, view: view.clone().unbind() });
         Ok(view)
     }
 

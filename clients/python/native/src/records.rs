@@ -2,7 +2,9 @@
 
 use crate::plan::{LentPart, Plan};
 use crate::shared::Shared;
+use pyo3::PyTraverseError;
 use pyo3::prelude::*;
+use pyo3::pyclass::PyVisit;
 use pyo3::types::PyBytes;
 use rohrpost_native::{RecordInfo, RecordPlace, StayingBytes};
 
@@ -36,9 +38,20 @@ impl Record {
         let value = value.bind(py).repr()?;
         Ok(format!("Record(value={value}, time_ns={time_ns}, epoch={epoch}, sequence={sequence})"))
     }
+
+    fn __eq__(&self, py: Python<'_>, other: &Self) -> PyResult<bool> {
+        let of = |it: &Self| (it.time_ns, it.epoch, it.sequence);
+        Ok(of(self) == of(other) && self.value.bind(py).eq(&other.value)?)
+    }
+
+    /// Nothing of it changes, so something else of a cycle can be cleared, as with a tuple.
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.value)
+    }
 }
 
-/// How the records of a stream are read.
+/// How the records of a stream are read. An object of its own: a garbage collector counts what refers to what.
+#[pyclass(frozen, module = "rohrpost._node")]
 pub(crate) struct Way {
     /// Which stream, for people.
     pub(crate) what: String,
@@ -48,73 +61,97 @@ pub(crate) struct Way {
     pub(crate) held: Py<PyAny>,
 }
 
-/// What of a record Python has, and which record.
-pub(crate) struct Hand {
-    sequence: u64,
-    held: Held,
+#[pymethods]
+impl Way {
+    /// Its stream can be cleared.
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.plan.as_ref().map_or(Ok(()), |plan| plan.visit(&visit))?;
+        visit.call(&self.held)
+    }
 }
 
-pub(crate) enum Held {
-    Nothing,
-    Part(LentPart),
+/// Which record Python has, and what of it.
+pub(crate) struct Hand {
+    /// Of its stream's hands.
+    pub(crate) number: u64,
+    pub(crate) sequence: u64,
+    /// None: it is being read, which may run code of an author.
+    pub(crate) held: Option<Held>,
+}
+
+/// What Python has of a record's memory.
+#[derive(Default)]
+pub(crate) struct Held {
+    parts: Vec<LentPart>,
     /// What Python has read, and looks after.
-    Python(Py<PyAny>),
+    python: Option<Py<PyAny>>,
 }
 
 impl Hand {
-    /// Of a record before it is read: that may run code of an author.
-    pub(crate) fn of(sequence: u64) -> Self {
-        Self { sequence, held: Held::Nothing }
-    }
-
-    /// Of a record that was read.
-    pub(crate) fn holding(sequence: u64, held: Held) -> Self {
-        Self { sequence, held }
-    }
-
-    /// It is held no more; the record's number, if something of its memory is kept.
-    pub(crate) fn release(self, py: Python<'_>) -> PyResult<Option<u64>> {
-        let is_free = match &self.held {
-            Held::Nothing => true,
-            Held::Part(part) => {
-                part.release(py) || {
-                    // What nothing leads to any more may wait for it, such as an exception in a local of its frame.
-                    py.import("gc")?.call_method0("collect")?;
-                    part.release(py)
-                }
-            }
-            Held::Python(held) => held.call_method0(py, "release")?.extract(py)?,
-        };
+    /// It is held no more; the record's number, if something of its memory is kept. `is_told`: it matters.
+    pub(crate) fn release(self, py: Python<'_>, is_told: bool) -> PyResult<Option<u64>> {
+        let is_free = self.held.map_or(Ok(true), |held| held.release(py, is_told))?;
         Ok((!is_free).then_some(self.sequence))
+    }
+
+    pub(crate) fn visit(&self, visit: &PyVisit<'_>) -> Result<(), PyTraverseError> {
+        let Some(Held { parts, python }) = &self.held else { return Ok(()) };
+        parts.iter().try_for_each(|part| part.visit(visit))?;
+        visit.call(python)
+    }
+}
+
+impl Held {
+    /// It is held no more; whether nothing of its memory is kept, if that `is_told`.
+    pub(crate) fn release(self, py: Python<'_>, is_told: bool) -> PyResult<bool> {
+        let Self { parts, python } = self;
+        let are_free = || parts.iter().filter(|part| !part.release(py)).count() == 0;
+        let mut is_free = are_free();
+        if !is_free && is_told {
+            // What nothing leads to any more may wait for it, such as an exception in a local of its frame.
+            py.import("gc")?.call_method0("collect")?;
+            is_free = are_free();
+        }
+        if let Some(python) = python {
+            is_free &= python.call_method1(py, "release", (is_told,))?.extract::<bool>(py)?;
+        }
+        Ok(is_free)
     }
 }
 
 impl Way {
     /// The value of a record, and what Python has of its memory.
     pub(crate) fn read(&self, py: Python<'_>, bytes: StayingBytes) -> PyResult<(Py<PyAny>, Held)> {
-        let place = match bytes {
-            StayingBytes::Ring(place) => place,
-            StayingBytes::Journal(bytes) => return self.by_python(py, PyBytes::new(py, &bytes).into_any().unbind()),
-        };
-        match self.planned(py, &place)? {
-            Some((value, part)) => Ok((value.unbind(), part.map_or(Held::Nothing, Held::Part))),
-            None => {
+        let mut held = Held::default();
+        let data = match bytes {
+            StayingBytes::Journal(bytes) => PyBytes::new(py, &bytes).into_any().unbind(),
+            StayingBytes::Ring(place) => {
+                if let Some(value) = self.planned(py, &place, &mut held.parts)? {
+                    return Ok((value.unbind(), held));
+                }
                 let all = 0..place.len();
-                self.by_python(py, Shared::new(py, place, all, true)?.into_any())
+                Shared::new(py, place, all, true)?.into_any()
             }
-        }
+        };
+        let python = self.held.call1(py, (data,))?;
+        let value = python.getattr(py, "value")?;
+        held.python = Some(python);
+        Ok((value, held))
     }
 
+    /// What it is by its plan. What was lent of a record that Python is to read, and is not free, is in `lent`.
     fn planned<'py>(
         &self,
         py: Python<'py>,
         place: &RecordPlace,
-    ) -> PyResult<Option<(Bound<'py, PyAny>, Option<LentPart>)>> {
-        self.plan.as_ref().map_or(Ok(None), |plan| plan.read(py, place))
-    }
-
-    fn by_python(&self, py: Python<'_>, data: Py<PyAny>) -> PyResult<(Py<PyAny>, Held)> {
-        let held = self.held.call1(py, (data,))?;
-        Ok((held.getattr(py, "value")?, Held::Python(held)))
+        lent: &mut Vec<LentPart>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(plan) = &self.plan else { return Ok(None) };
+        let value = plan.read(py, place, lent);
+        if !matches!(value, Ok(Some(_))) {
+            // An author's class may have kept it.
+            lent.retain(|part| !part.release(py));
+        }
+        value
     }
 }

@@ -11,6 +11,7 @@ use pyo3::ffi;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use rohrpost_native::RecordPlace;
+use std::cell::UnsafeCell;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::mem::offset_of;
 use std::ops::Range;
@@ -38,6 +39,8 @@ struct Object {
     address: ffi::Py_ssize_t,
     length: ffi::Py_ssize_t,
     is_readonly: c_int,
+    /// Its record is lent no more, so there are no new views; changed as `views` is.
+    is_over: c_int,
     place: RecordPlace,
 }
 
@@ -64,6 +67,7 @@ impl Shared {
             ptr::addr_of_mut!((*object).address).write(address);
             ptr::addr_of_mut!((*object).length).write(length);
             ptr::addr_of_mut!((*object).is_readonly).write(c_int::from(is_readonly));
+            ptr::addr_of_mut!((*object).is_over).write(0);
             ptr::addr_of_mut!((*object).place).write(place);
             Ok(Self(made.unbind()))
         }
@@ -75,10 +79,10 @@ impl Shared {
         unsafe { Bound::from_owned_ptr_or_err(py, ffi::PyMemoryView_FromObject(self.0.as_ptr())) }
     }
 
-    /// Whether no view of it is left.
-    pub(crate) fn is_free(&self, _: Python<'_>) -> bool {
+    /// There are no new views of it from now on; whether no old one is left.
+    pub(crate) fn end(&self, _: Python<'_>) -> bool {
         // SAFETY: it is of the class below, as `new` made it; the interpreter's lock is held.
-        unsafe { (*self.0.as_ptr().cast::<Object>()).views == 0 }
+        unsafe { ended(self.0.as_ptr().cast()) }
     }
 
     /// As Python has it.
@@ -87,24 +91,46 @@ impl Shared {
     }
 }
 
+const OVER: &CStr = c"the record of these bytes is in hand no more; copy what you keep: `bytes(…)`, `numpy.array(…)`";
+
 static CLASS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 
 /// Python cannot make objects of it, nor change it, nor make a class of it.
 const FLAGS: u64 = ffi::Py_TPFLAGS_DEFAULT | ffi::Py_TPFLAGS_DISALLOW_INSTANTIATION | ffi::Py_TPFLAGS_IMMUTABLETYPE;
 
+/// Python reads them as long as there is the class, so for ever.
+struct Methods(UnsafeCell<[ffi::PyMethodDef; 2]>);
+
+// SAFETY: Python reads them alone, and with its lock.
+unsafe impl Sync for Methods {}
+
+static METHODS: Methods = Methods(UnsafeCell::new([
+    ffi::PyMethodDef {
+        ml_name: c"end".as_ptr(),
+        ml_meth: ffi::PyMethodDefPointer { PyCFunction: end },
+        ml_flags: ffi::METH_NOARGS,
+        ml_doc: c"There are no new views of it from now on; whether no old one is left.".as_ptr(),
+    },
+    ffi::PyMethodDef::zeroed(),
+]));
+
+impl Methods {
+    fn get(&self) -> *mut ffi::PyMethodDef {
+        self.0.get().cast()
+    }
+}
+
 fn class(py: Python<'_>) -> PyResult<Py<PyAny>> {
     // The class has copies of these, or of what is in them, but of the names.
-    let mut members = [
-        member(c"length", offset_of!(Object, length), c"How many there are."),
-        member(c"views", offset_of!(Object, views), c"How many views of them there are."),
-        ffi::PyMemberDef::default(),
-    ];
+    let mut members =
+        [member(c"length", offset_of!(Object, length), c"How many there are."), ffi::PyMemberDef::default()];
     let slot = |slot, pfunc| ffi::PyType_Slot { slot, pfunc };
     let mut slots = [
         slot(ffi::Py_bf_getbuffer, get_buffer as *mut c_void),
         slot(ffi::Py_bf_releasebuffer, release_buffer as *mut c_void),
         slot(ffi::Py_tp_dealloc, dealloc as *mut c_void),
         slot(ffi::Py_tp_members, members.as_mut_ptr().cast()),
+        slot(ffi::Py_tp_methods, METHODS.get().cast()),
         slot(0, ptr::null_mut()),
     ];
     let mut spec = ffi::PyType_Spec {
@@ -125,12 +151,36 @@ fn member(name: &'static CStr, offset: usize, text: &'static CStr) -> ffi::PyMem
     ffi::PyMemberDef { name, type_code: ffi::Py_T_PYSSIZET, offset, flags: ffi::Py_READONLY, doc }
 }
 
+/// # Safety
+/// With an object of the class, and the interpreter's lock.
+unsafe fn ended(it: *mut Object) -> bool {
+    // SAFETY: as above.
+    unsafe {
+        (*it).is_over = 1;
+        (*it).views == 0
+    }
+}
+
+/// Python's `end`.
+unsafe extern "C" fn end(object: *mut ffi::PyObject, _: *mut ffi::PyObject) -> *mut ffi::PyObject {
+    // SAFETY: Python calls it with an object of the class, and its lock.
+    unsafe { ffi::PyBool_FromLong(ended(object.cast()).into()) }
+}
+
 /// Somebody wants a view.
 unsafe extern "C" fn get_buffer(object: *mut ffi::PyObject, view: *mut c_void, flags: c_int) -> c_int {
     let it = object.cast::<Object>();
     // SAFETY: Python calls it with an object of the class, a `Py_buffer` to fill, and its lock. The view holds the
     // object, which keeps its memory mapped.
     unsafe {
+        if (*it).is_over != 0 {
+            if !view.is_null() {
+                // Python wants to see there that it got none: `obj`, the second of a `Py_buffer`, after an address.
+                view.cast::<*mut ffi::PyObject>().add(1).write(ptr::null_mut());
+            }
+            ffi::PyErr_SetString(ffi::PyExc_BufferError, OVER.as_ptr());
+            return -1;
+        }
         let first = ptr::with_exposed_provenance_mut((*it).address as usize);
         let filled = PyBuffer_FillInfo(view, object, first, (*it).length, (*it).is_readonly, flags);
         if filled == 0 {

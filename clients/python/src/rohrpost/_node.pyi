@@ -2,15 +2,16 @@
 
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any
+from typing import Any, type_check_only
 
+@type_check_only
 class Shared:
     """A buffer: bytes in shared memory, which stays mapped as long as this is there."""
 
     @property
     def length(self) -> int: ...
-    @property
-    def views(self) -> int: ...
+    def end(self) -> bool:
+        """There are no new views of it from now on; whether no old one is left."""
     def __buffer__(self, flags: int, /) -> memoryview: ...
 
 class Record:
@@ -28,6 +29,7 @@ class Record:
     @property
     def sequence(self) -> int:
         """Its number in the stream."""
+    def __eq__(self, other: object, /) -> bool: ...
 
 class InHand:
     """A record, from the beginning of a ``with`` to its end."""

@@ -149,9 +149,10 @@ class Bridge(NodeHost):
             raise Misuse(f"{_followed(handler)} cannot be read: {error}") from None
         try:
             getattr(self._its(), handler.name)(held.value)
-        finally:
-            is_free = held.release()
-        if not is_free:
+        except BaseException:
+            held.release(is_told=False)
+            raise
+        if not held.release():
             raise kept(f"record {sequence} of {_followed(handler)}")
 
     @_told
@@ -163,7 +164,7 @@ class Bridge(NodeHost):
     def command(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
         """Runs a function: its result; or none, whether the arguments are to blame, and why."""
         answer = self._answered(number, arguments)
-        left = self._settled(None)
+        left = self._settled(answer[2] if answer[0] is None else None)
         return answer if left is None or answer[0] is None else (None, False, left)
 
     def _answered(self, number: int, arguments: bytes) -> tuple[bytes | None, bool, str]:
@@ -280,10 +281,10 @@ class Bridge(NodeHost):
             self._kept[opened.stream] = opened.view
             self._given_up.add(opened.stream)
 
-    def _is_free(self, stream: str) -> bool:
-        """Whether nobody can write any more into records of this stream that were given up."""
+    def _is_free(self, stream: str, is_told: bool = True) -> bool:
+        """Whether nobody can write any more into records of this stream that were given up, if that ``is_told``."""
         view = self._kept.get(stream)
-        if view is not None and not view.release():
+        if view is not None and not view.release(is_told):
             return False
         self._kept.pop(stream, None)
         return True
@@ -294,7 +295,7 @@ class Bridge(NodeHost):
             self._give_up(self._opened)
         while self._given_up:
             stream = self._given_up.pop()
-            if not self._is_free(stream):
+            if not self._is_free(stream, is_told=failed is None):
                 failed = failed or words_of(_kept(stream))
         return failed
 

@@ -41,23 +41,28 @@ class View:
         self._lent.append(part)
         return part
 
-    def release(self) -> bool:
-        """They are lent no more; whether nothing of them was kept. Asked again, whether that holds still."""
+    def release(self, is_told: bool = True) -> bool:
+        """They are lent no more; whether nothing of them was kept. Asked again, whether that holds still. ``is_told``:
+        it matters, so nothing is said to be kept that is not."""
         if self._is_free():
             return True
+        if not is_told:
+            return False
         # What nobody reaches any more may wait for it, such as an exception in a local of the frame that caught it.
         gc.collect()
         return self._is_free()
 
     def _is_free(self) -> bool:
-        for view in reversed(self._lent):
-            try:
+        try:
+            for view in reversed(self._lent):
                 view.release()
-            except BufferError:  # An array of numpy is made of it, say.
-                return False
-        self._lent.clear()
-        self.__dict__.pop("whole", None)
-        return not self._shared.views
+        except BufferError:  # An array of numpy is made of it, say.
+            pass
+        else:
+            self._lent.clear()
+            self.__dict__.pop("whole", None)
+        # From now on, it makes no new ones: what has it, as `view.obj`, has no way to another record.
+        return self._shared.end()
 
 
 class Held:
@@ -72,14 +77,14 @@ class Held:
         try:
             self.value = decode(type, view.whole, view.lend)
         except BaseException:
-            self.release()
+            self.release(is_told=False)
             raise
 
-    def release(self) -> bool:
-        """It is held no more; whether nothing of its memory was kept."""
+    def release(self, is_told: bool = True) -> bool:
+        """It is held no more; whether nothing of its memory was kept, if that ``is_told``."""
         self.__dict__.pop("value", None)
         view, self._view = self._view, None
-        return view is None or view.release()
+        return view is None or view.release(is_told)
 
 
 def kept(what: str) -> Misuse:
