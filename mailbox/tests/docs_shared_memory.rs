@@ -18,7 +18,7 @@ const PAGE: &str = include_str!("../../docs/src/shared-memory.md");
 /// Where the parts of a mailbox and their fields are told.
 const PARTS: &str = "## A mailbox";
 const FIELDS: &str = "### Identity, owner, hot";
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// The offset that a section's table gives for a field: the first of the row's cells that begins with its name tells.
 fn at(section: &str, field: &str) -> usize {
@@ -256,6 +256,7 @@ fn the_node_and_its_time_are_as_documented() {
     let ground = Ground::new();
     let node = ground.node();
     let me = Participant::join(&node, Name::new(1, 200, 0, 0)).unwrap();
+    me.set_state(ModuleState::Error);
     me.set_state(ModuleState::On);
     me.set_restarts(7);
     me.begin_work(Work::Function(16));
@@ -268,6 +269,7 @@ fn the_node_and_its_time_are_as_documented() {
     let entry = [0, 4, 8, 12, 16, 20].map(|at| there.u32(64 + at));
     assert_eq!(entry, [me.incarnation(), std::process::id(), 2, 0x01c8_0000, 3, 7]);
     assert!(there.u64(64 + 24) > 0);
+    assert_eq!(there.u32(64 + 36), 1, "errors");
     let (mark, now_ns) = (there.u64(64 + 40), rohrpost_mailbox::monotonic_ns());
     assert_eq!((mark >> 56, mark >> 40 & 0xffff), (7, 16));
     let since_ns = (mark & ((1 << 40) - 1)) << 20;

@@ -347,7 +347,7 @@ fn the_programs_of_the_book_do_what_it_says() {
     command.arg(&robot.installation.path).arg("main").env("ROHRPOST_DIR", place.memory());
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut echo = Running::start(command);
-    let [me, there] = ["tool.71", "tool.70"].map(|name| robot.name(name));
+    let [me, there] = ["tool.41", "tool.40"].map(|name| robot.name(name));
     let participant = Participant::join(&robot.node, me).unwrap();
     let mut receiver = participant.receiver(me, Shape::default()).unwrap();
     let mut sender = wait("it receives", || {
