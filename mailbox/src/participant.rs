@@ -96,6 +96,7 @@ impl Participant {
     /// Says what the module is doing, for everyone to read.
     pub fn set_state(&self, state: ModuleState) {
         if state == ModuleState::Error {
+            // Relaxed: the Release of the state hands it over, too.
             self.entry().errors.fetch_add(1, Ordering::Relaxed);
         }
         self.entry().state.store(state as u32, Ordering::Release);
