@@ -34,12 +34,12 @@ pub(crate) fn ci() -> ExitCode {
 const LINTS: [Stage; 4] = [
     Stage {
         name: "format",
-        budget: 1,
+        budget_s: 180,
         run: || whole(cargo::run("looking at the format", &mut cargo(&["fmt", "--all", "--check"]))),
     },
     Stage {
         name: "clippy for all but the GUI bridge",
-        budget: 6,
+        budget_s: 1080,
         run: || {
             let all = ["clippy", "--workspace", "--exclude", BRIDGE, "--all-targets", "--", "--deny", "warnings"];
             whole(cargo::run("clippy for all but the GUI bridge", &mut cargo(&all)))
@@ -47,12 +47,12 @@ const LINTS: [Stage; 4] = [
     },
     Stage {
         name: "clippy for the GUI bridge",
-        budget: 6,
+        budget_s: 1080,
         run: || whole(cargo::run("clippy for the GUI bridge", &mut bridge_clippy())),
     },
     Stage {
         name: "clippy for what the author of a module compiles",
-        budget: 1,
+        budget_s: 180,
         run: || {
             let bare = ["clippy", "--package", "rohrpost", "--package", "rohrpost-modules", "--lib"];
             let why = "clippy for what the author of a module compiles";
@@ -64,7 +64,7 @@ const LINTS: [Stage; 4] = [
 /// What a change to the product may break.
 const PRODUCT: Stage = Stage {
     name: "tests of the product",
-    budget: 25,
+    budget_s: 4500,
     run: || {
         let most = ["test", "--workspace", "--exclude", BRIDGE, "--exclude", BENCH, "--no-fail-fast"];
         parts::run("testing all but the GUI bridge and the bench", tests(&most))
@@ -74,26 +74,26 @@ const PRODUCT: Stage = Stage {
 const ALL: [Stage; 8] = [
     Stage {
         name: "tests of all but the GUI bridge",
-        budget: 25,
+        budget_s: 4500,
         run: || {
             let all = ["test", "--workspace", "--exclude", BRIDGE, "--no-fail-fast"];
             parts::run("testing all but the GUI bridge", tests(&all))
         },
     },
-    Stage { name: "ThreadSanitizer", budget: 1, run: || whole(tsan::run().map(drop)) },
-    Stage { name: "instructions of the hot paths", budget: 4, run: || whole(instructions::check()) },
-    Stage { name: "fuzzing, short", budget: 4, run: || whole(fuzz::short()) },
+    Stage { name: "ThreadSanitizer", budget_s: 180, run: || whole(tsan::run().map(drop)) },
+    Stage { name: "instructions of the hot paths", budget_s: 720, run: || whole(instructions::check()) },
+    Stage { name: "fuzzing, short", budget_s: 720, run: || whole(fuzz::short()) },
     Stage {
         name: "tests of the GUI bridge",
-        budget: 5,
+        budget_s: 900,
         run: || {
             let bridge = ["test", "--profile", BRIDGE_PROFILE, "--package", BRIDGE, "--no-fail-fast"];
             parts::run("testing the GUI bridge", tests(&bridge))
         },
     },
-    Stage { name: "drawings, with Rerun's command line", budget: 5, run: || whole(drawings()) },
-    Stage { name: "recordings, with Python's reader", budget: 2, run: || whole(recordings()) },
-    Stage { name: "the client in Python, installed, with mypy", budget: 3, run: || whole(python_client()) },
+    Stage { name: "drawings, with Rerun's command line", budget_s: 900, run: || whole(drawings()) },
+    Stage { name: "recordings, with Python's reader", budget_s: 360, run: || whole(recordings()) },
+    Stage { name: "the client in Python, installed, with mypy", budget_s: 540, run: || whole(python_client()) },
 ];
 
 /// A stage without parts.

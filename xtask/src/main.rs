@@ -13,6 +13,7 @@ mod fuzz;
 mod instructions;
 mod parts;
 mod picture;
+mod processor;
 mod report;
 mod stages;
 mod tsan;

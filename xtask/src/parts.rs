@@ -2,7 +2,9 @@
 
 use crate::cargo;
 use crate::failure::Failure;
+use crate::processor;
 use std::io::{self, BufRead, BufReader, PipeReader, Write};
+use std::iter::Sum;
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
@@ -17,26 +19,43 @@ const LAST_WORDS: Duration = Duration::from_secs(3);
 /// A part of a stage: what Cargo builds, a test program, or a crate's doc tests.
 pub(crate) struct Part {
     pub(crate) name: String,
-    pub(crate) took: Duration,
+    pub(crate) took: Spent,
+}
+
+/// What something has cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Spent {
+    pub(crate) wall: Duration,
+    pub(crate) processor: Duration,
+}
+
+impl Sum for Spent {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |sum, next| Self {
+            wall: sum.wall + next.wall,
+            processor: sum.processor + next.processor,
+        })
+    }
 }
 
 /// Runs `cargo test`, shows what it prints, and takes the time of its parts.
 pub(crate) fn run(why: &str, mut command: Command) -> (Vec<Part>, Result<(), Failure>) {
     let shown = cargo::shown(&command);
     eprintln!("==> {why}\n    {shown}");
-    let mut clock = PartClock::new(Instant::now());
-    let result = match follow(&mut command, |line| clock.line(line, Instant::now())) {
+    let (mut clock, before) = (PartClock::new(Instant::now()), processor::of_ended_children());
+    let seen = |line: &str, pid| clock.line(line, Instant::now(), processor::of(pid));
+    let result = match follow(&mut command, seen) {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(format!("{why}: `{shown}` ended with {status}")),
         Err(error) => Err(format!("cannot run `{shown}`: {error}")),
     };
-    (clock.end(Instant::now()), result)
+    (clock.end(Instant::now(), processor::of_ended_children() - before), result)
 }
 
 /// Both outputs are one, so that what Cargo says of a program comes before what that prints.
 ///
 /// A process that a killed test leaves behind holds the pipe for as long as it lives: only the command is waited for.
-fn follow(command: &mut Command, mut see: impl FnMut(&str)) -> io::Result<ExitStatus> {
+fn follow(command: &mut Command, mut see: impl FnMut(&str, u32)) -> io::Result<ExitStatus> {
     let (reader, writer) = io::pipe()?;
     let mut child = command.stdout(writer.try_clone()?).stderr(writer).spawn()?;
     // The command holds the writing ends; the pipe ends with the last of them.
@@ -58,7 +77,7 @@ fn follow(command: &mut Command, mut see: impl FnMut(&str)) -> io::Result<ExitSt
         }
         if let Ok((_, line)) = next {
             let line = line?;
-            see(&String::from_utf8_lossy(&line));
+            see(&String::from_utf8_lossy(&line), child.id());
             out.write_all(&line)?;
         }
     }
@@ -86,25 +105,35 @@ struct PartClock {
     parts: Vec<Part>,
     name: String,
     began: Instant,
+    /// Processor time of all before this part.
+    before: Duration,
 }
 
 impl PartClock {
     fn new(began: Instant) -> Self {
-        Self { parts: Vec::new(), name: "build".to_owned(), began }
+        Self { parts: Vec::new(), name: "build".to_owned(), began, before: Duration::ZERO }
     }
 
-    fn line(&mut self, line: &str, now: Instant) {
+    /// `processor`: what the command and its ended children have used, if that is known.
+    fn line(&mut self, line: &str, now: Instant, processor: Option<Duration>) {
         let Some(next) = program(line) else { return };
         let name = std::mem::replace(&mut self.name, next);
-        self.parts.push(Part { name, took: now - self.began });
-        self.began = now;
+        self.part(name, now, processor.unwrap_or(self.before));
+    }
+
+    fn part(&mut self, name: String, now: Instant, processor: Duration) {
+        let took = Spent { wall: now - self.began, processor: processor.saturating_sub(self.before) };
+        self.parts.push(Part { name, took });
+        (self.began, self.before) = (now, processor);
     }
 
     /// The longest first; short ones in one row.
-    fn end(mut self, now: Instant) -> Vec<Part> {
-        self.parts.push(Part { name: self.name, took: now - self.began });
-        let (mut long, short): (Vec<_>, Vec<_>) = self.parts.into_iter().partition(|part| part.took >= OWN_ROW);
-        long.sort_by_key(|part| std::cmp::Reverse(part.took));
+    fn end(mut self, now: Instant, processor: Duration) -> Vec<Part> {
+        let name = std::mem::take(&mut self.name);
+        self.part(name, now, processor);
+        let is_long = |part: &Part| part.took.wall.max(part.took.processor) >= OWN_ROW;
+        let (mut long, short): (Vec<_>, Vec<_>) = self.parts.into_iter().partition(is_long);
+        long.sort_by_key(|part| std::cmp::Reverse(part.took.wall));
         if !short.is_empty() {
             let name = format!("{} more, each below {} s", short.len(), OWN_ROW.as_secs());
             long.push(Part { name, took: short.iter().map(|part| part.took).sum() });
@@ -140,10 +169,15 @@ mod tests {
             (331, "test Running late (deps/a-b) ... ok"),
             (332, "   Doc-tests rohrpost"),
         ];
-        lines.iter().for_each(|(at, line)| clock.line(line, began + Duration::from_secs(*at)));
-        let parts = clock.end(began + Duration::from_secs(335));
-        let seen: Vec<_> = parts.iter().map(|part| (part.name.as_str(), part.took.as_secs())).collect();
-        assert_eq!(seen, [("e2e", 270), ("build", 60), ("2 more, each below 5 s", 5)]);
+        // The command has used half of the time so far; at its end it was seen to have used a little more.
+        let seconds = Duration::from_secs;
+        lines.iter().for_each(|(at, line)| clock.line(line, began + seconds(*at), Some(seconds(at / 2))));
+        let parts = clock.end(began + seconds(335), seconds(170));
+        let seen: Vec<_> = parts
+            .iter()
+            .map(|Part { name, took }| (name.as_str(), took.wall.as_secs(), took.processor.as_secs()))
+            .collect();
+        assert_eq!(seen, [("e2e", 270, 135), ("build", 60, 30), ("2 more, each below 5 s", 5, 5)]);
     }
 
     #[test]
@@ -151,7 +185,7 @@ mod tests {
         let mut lines = Vec::new();
         let mut command = Command::new("sh");
         command.args(["-c", "echo one; echo two >&2; printf three; exit 3"]);
-        let status = follow(&mut command, |line| lines.push(line.trim().to_owned())).expect("sh runs");
+        let status = follow(&mut command, |line, _| lines.push(line.trim().to_owned())).expect("sh runs");
         assert_eq!((lines.join(" "), status.code()), ("one two three".to_owned(), Some(3)));
     }
 
@@ -161,7 +195,7 @@ mod tests {
         let mut lines = Vec::new();
         let mut command = Command::new("sh");
         command.args(["-c", "sleep 60 & echo $!; kill -9 $$"]);
-        let status = follow(&mut command, |line| lines.push(line.trim().to_owned())).expect("sh runs");
+        let status = follow(&mut command, |line, _| lines.push(line.trim().to_owned())).expect("sh runs");
         assert_eq!((lines.len(), status.signal()), (1, Some(9)), "{lines:?}");
         let killed = Command::new("kill").arg(&lines[0]).status().expect("kill runs");
         assert!(killed.success(), "it was waited for");
