@@ -1,4 +1,4 @@
-//! Draws an invented robot for a minute of its time: `cargo run --profile bridge -p rohrpost-gui-bridge --example scene
+//! Draws an invented robot for a minute of its time: `cargo run -p rohrpost-gui-bridge --example scene
 //! scene.rrd`, then `rerun scene.rrd` or `cargo xtask picture scene.rrd scene.png`.
 
 use rohrpost::schema::Value;

@@ -13,9 +13,7 @@ fn cargo(project: &Path, command: &str) -> Command {
     // The target folder is reached as `target`, so that robot.toml finds the program where it looks for it.
     cargo.current_dir(project).env_remove("CARGO_TARGET_DIR").args([command, "--offline", "--quiet"]);
     for setting in [
-        "profile.dev.opt-level=1",
         "profile.dev.debug=\"line-tables-only\"",
-        "profile.dev.package.\"*\".opt-level=0",
         "profile.dev.package.\"*\".debug=false",
     ] {
         cargo.args(["--config", setting]);

@@ -6,8 +6,6 @@ use std::process::{Command, ExitStatus};
 
 /// The package with a build that compiles all of Rerun.
 pub(crate) const BRIDGE: &str = "rohrpost-gui-bridge";
-/// The profile that this package is built in, and the folder below `target` that this makes.
-pub(crate) const BRIDGE_PROFILE: &str = "bridge";
 
 /// The workspace's root.
 pub(crate) fn root() -> PathBuf {
@@ -26,6 +24,12 @@ pub(crate) fn target() -> PathBuf {
 pub(crate) fn cargo(args: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(args).current_dir(root()).env("CARGO_TARGET_DIR", target());
+    // What `cargo xtask` has told of this package. Build scripts (ring's) run anew if they see it once and then not, and
+    // so all would be compiled twice that needs them: by `cargo demo`, and by `cargo build` after it.
+    let ours = |name: &str| ["CARGO_PKG_", "CARGO_MANIFEST_", "CARGO_BIN_"].iter().any(|begin| name.starts_with(begin));
+    for (name, _) in std::env::vars().filter(|(name, _)| ours(name)) {
+        command.env_remove(name);
+    }
     command
 }
 

@@ -5,7 +5,7 @@
 //! find that command line by the environment variable `ROHRPOST_RERUN`, and have to fail without it, saying
 //! `run them by "cargo xtask test --all", which installs Rerun`.
 
-use crate::cargo::{self, BRIDGE, BRIDGE_PROFILE, cargo};
+use crate::cargo::{self, BRIDGE, cargo};
 use crate::failure::Failure;
 use crate::parts;
 use crate::report;
@@ -87,7 +87,7 @@ const ALL: [Stage; 8] = [
         name: "tests of the GUI bridge",
         budget_s: 900,
         run: || {
-            let bridge = ["test", "--profile", BRIDGE_PROFILE, "--package", BRIDGE, "--no-fail-fast"];
+            let bridge = ["test", "--package", BRIDGE, "--no-fail-fast"];
             parts::run("testing the GUI bridge", tests(&bridge))
         },
     },
@@ -110,7 +110,7 @@ fn tests(args: &[&str]) -> Command {
 
 fn drawings() -> Result<(), Failure> {
     // The example is a bridge with a user's own view, which a test starts.
-    let build = ["build", "--profile", BRIDGE_PROFILE, "--package", BRIDGE, "--bin", BRIDGE, "--example", "own_view"];
+    let build = ["build", "--package", BRIDGE, "--bin", BRIDGE, "--example", "own_view"];
     cargo::run("building the GUI bridge", &mut cargo(&build))?;
     let rerun = venv::venv()?.rerun;
     let test = ["test", "--package", "rohrpost-cli", "--features", "rerun-tests", "--test", "rerun"];
@@ -119,7 +119,7 @@ fn drawings() -> Result<(), Failure> {
         tests(&test)
             .args(["--", "--test-threads", "1"])
             .env("ROHRPOST_RERUN", rerun)
-            .env("ROHRPOST_BRIDGE", cargo::target().join(BRIDGE_PROFILE).join(BRIDGE)),
+            .env("ROHRPOST_BRIDGE", cargo::target().join("debug").join(BRIDGE)),
     )
 }
 
@@ -165,7 +165,7 @@ fn python_client() -> Result<(), Failure> {
 /// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the
 /// compiler of the workspace's own crates, clippy takes Rerun as it was built: 10 seconds.
 fn bridge_clippy() -> Command {
-    let mut command = cargo(&["build", "--profile", BRIDGE_PROFILE, "--package", BRIDGE, "--all-targets"]);
+    let mut command = cargo(&["build", "--package", BRIDGE, "--all-targets"]);
     // The flags of `cargo clippy -- --deny warnings` for its driver.
     command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
     command

@@ -1,6 +1,6 @@
 //! `cargo demo`: from a fresh clone to a robot on the screen.
 
-use crate::cargo::{self, BRIDGE, BRIDGE_PROFILE};
+use crate::cargo::{self, BRIDGE};
 use crate::failure::Failure;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
@@ -16,12 +16,12 @@ pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
         cargo::run(
             "building the GUI bridge with Rerun: some 400 crates, unoptimised, about 3 minutes on two cores the first \
              time (`cargo demo --no-gui` goes without)",
-            &mut cargo::cargo(&["build", "--profile", BRIDGE_PROFILE, "--package", BRIDGE]),
+            &mut cargo::cargo(&["build", "--package", BRIDGE]),
         )?;
     }
     let programs = cargo::target().join("debug");
     let mut demo = Command::new(programs.join("rohrpost"));
-    demo.arg("demo").args(args).env("PATH", path(&[cargo::target().join(BRIDGE_PROFILE), programs])?);
+    demo.arg("demo").args(args).env("PATH", path(&[programs])?);
     become_it(&mut demo)
 }
 

@@ -9,7 +9,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-const PROFILE: &str = "counted";
 /// The folder of the programs that are counted, from the root.
 const FOLDER: &str = "benches/instructions";
 /// They count what happens inside a function of this name.
@@ -149,7 +148,7 @@ fn build() -> Result<Vec<PathBuf>, Failure> {
         return Err("no valgrind, which counts instructions; install it: `apt-get install valgrind`".into());
     }
     let package = ["--package", "rohrpost-bench", "--no-default-features", "--features", "lan"];
-    let mut build = cargo(&["build", "--profile", PROFILE, "--bench", "instructions", "--bench", "instructions-c"]);
+    let mut build = cargo(&["build", "--release", "--bench", "instructions", "--bench", "instructions-c"]);
     build.args(package);
     cargo::run("building the hot paths", &mut build)?;
     // Cargo says which files it made; the names have hashes.
