@@ -60,14 +60,9 @@ pub(crate) fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
 }
 
-/// The package with its part in Rust, which is built by the profile of this workspace.
+/// The package with its part in Rust, which Cargo has put beside this program.
 pub(crate) fn package(place: &Place) -> PathBuf {
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.args(["build", "--offline", "--quiet", "--package", "rohrpost-python"]).current_dir(repository());
-    let built = cargo.output().unwrap();
-    assert!(built.status.success(), "{built:?}");
-    // target/debug/deps/e2e-…
-    let library = std::env::current_exe().unwrap().ancestors().nth(2).unwrap().join("lib_node.so");
+    let library = std::env::current_exe().unwrap().with_file_name("lib_node.so");
     let (path, sources) = (place.path("package"), repository().join("clients/python/src/rohrpost"));
     std::fs::create_dir_all(path.join("rohrpost")).unwrap();
     for entry in std::fs::read_dir(sources).unwrap().map(|entry| entry.unwrap()) {

@@ -1,8 +1,8 @@
 //! The GUI bridge with Rerun's own command line: the content of a drawing, and the effect of a faulty viewer on a
 //! robot.
 //!
-//! Behind the feature `rerun-tests`, since they need two programs that nobody else does; `cargo xtask test --all`
-//! brings both.
+//! They run only if they are named, since they need two programs that nobody else does; `cargo xtask test --all` brings
+//! both.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

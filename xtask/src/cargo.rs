@@ -3,9 +3,20 @@
 use crate::failure::Failure;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
+use std::sync::OnceLock;
 
 /// The package with a build that compiles all of Rerun.
 pub(crate) const BRIDGE: &str = "rohrpost-gui-bridge";
+
+/// Whether Cargo is called for a whole check, by [`check_what_is_compiled`].
+static CHECKED: OnceLock<()> = OnceLock::new();
+
+/// From now on, clippy is the compiler of the workspace's own crates, and its warnings are errors. So what is linted is
+/// what the tests use; a `cargo clippy` beside it would compile all once more, since it shares nothing with a build. And
+/// nothing is kept for a next compilation, which costs a sixth of the first one.
+pub(crate) fn check_what_is_compiled() {
+    CHECKED.get_or_init(|| ());
+}
 
 /// The workspace's root.
 pub(crate) fn root() -> PathBuf {
@@ -29,6 +40,11 @@ pub(crate) fn cargo(args: &[&str]) -> Command {
     let ours = |name: &str| ["CARGO_PKG_", "CARGO_MANIFEST_", "CARGO_BIN_"].iter().any(|begin| name.starts_with(begin));
     for (name, _) in std::env::vars().filter(|(name, _)| ours(name)) {
         command.env_remove(name);
+    }
+    if CHECKED.get().is_some() {
+        // The flags of `cargo clippy -- --deny warnings` for its driver.
+        command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
+        command.env("CARGO_INCREMENTAL", "0");
     }
     command
 }
