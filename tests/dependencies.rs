@@ -31,10 +31,11 @@ const DOUBLED: [(&str, &str); 6] = [
 ];
 
 /// Our tools, or crates that only tools need.
-const NOT_FOR_MODULES: [&str; 14] = [
+const NOT_FOR_MODULES: [&str; 17] = [
     "clap",
     "comfy-table",
     "flate2",
+    "humantime",
     "mcap",
     "pyo3",
     "rand",
@@ -42,8 +43,10 @@ const NOT_FOR_MODULES: [&str; 14] = [
     "rcgen",
     "rerun",
     "rohrpost-bench",
+    "rohrpost-builtin",
     "rohrpost-native",
     "rohrpost-recording",
+    "rohrpost-robot",
     "rustls",
     "serde_json",
 ];

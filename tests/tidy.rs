@@ -69,7 +69,8 @@ const PAIRS: &[(&str, &str, &str)] = &[
 /// Type names that several files of a crate use, each for a type of its own, and the reason.
 const SHARED_NAMES: &[(&str, &str, &str)] = &[
     ("cli/src", "Arguments", "each subcommand has its own, in a file of its name"),
-    ("modules/src", "Settings", "each module has its own, as those of an author have"),
+    ("modules/builtin/src", "Settings", "each module has its own, as those of an author have"),
+    ("modules/robot/src", "Settings", "each computation has its own, which its module's settings hold"),
     ("tests/fuzz/src", "World", "each target is a program of its own, and has one"),
 ];
 

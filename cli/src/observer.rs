@@ -3,9 +3,10 @@
 use super::units::short;
 use crate::terminal::Failure;
 use rohrpost::launcher::launcher_of;
-use rohrpost::output::{iso, plain};
+use rohrpost::output::plain;
 use rohrpost::survey::LookFailure;
 use rohrpost::{CallError, Fault, ToolLink};
+use rohrpost_builtin::format::iso;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{SendError, realtime_ns};
 use serde::Serialize;

@@ -30,7 +30,7 @@ pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
     if arguments.builtin == REPLAY {
         return Ok(exit(replay::play(start)));
     }
-    match rohrpost_modules::builtin::run(&arguments.builtin, start) {
+    match rohrpost_builtin::run(&arguments.builtin, start) {
         Some(result) => Ok(exit(result)),
         // The command line accepts no other names; a name without a program is a bug.
         None => Err(format!("the built-in module `{}` has no program; report this", arguments.builtin).into()),

@@ -55,9 +55,7 @@ pub(super) fn answered(function: &str) -> String {
 /// The interface of a built-in module or of its alias; it need not run.
 pub(super) fn built_in(installation: &Installation, module: Name) -> Option<Description> {
     match &installation.module(module)?.program {
-        Program::Builtin(name) => {
-            rohrpost_modules::builtin::description(name, installation.classes.name(module.class())?)
-        }
+        Program::Builtin(name) => rohrpost_builtin::description(name, installation.classes.name(module.class())?),
         Program::Command(_) => None,
     }
 }

@@ -1,19 +1,17 @@
-//! The module template, interfaces and proxies, calls, subscriptions, output, launch, and the built-in modules.
+//! The module template, interfaces and proxies, calls, subscriptions, output, and launch.
 //!
 //! ```text
-//! types, interfaces   what modules exchange            robot, builtin   modules that come with Rohrpost
+//! types, interfaces   what modules exchange            journal          a module's run, to be repeated
 //! call                commands, at most once           runtime          the loop of a module's thread
 //! publish             subscribers of data              launch           starts, watches and stops a node's modules
 //! parameter           settings that may change         output           lines of output
-//! journal             a module's run, to be repeated
 //! ```
 //!
-//! Module authors use it through the crate `rohrpost`.
+//! Module authors use it through the crate `rohrpost`. Modules that come with Rohrpost are in the crate
+//! `rohrpost-builtin`.
 
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "builtin")]
-pub mod builtin;
 pub mod call;
 pub mod common;
 pub mod description;
@@ -30,8 +28,6 @@ pub mod output;
 pub mod parameter;
 mod places;
 mod publish;
-#[cfg(feature = "builtin")]
-pub mod robot;
 pub mod runtime;
 pub mod survey;
 pub mod types;

@@ -8,7 +8,7 @@ use rohrpost::launcher::{Phase, launcher_of};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 
-const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/tests/data/small.log");
+const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/robot/tests/data/small.log");
 
 /// The number in front of these words.
 fn number(text: &str, words: &str) -> u64 {

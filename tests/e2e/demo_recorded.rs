@@ -5,7 +5,7 @@ use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost_recording::{ChannelInfo, info};
 
-const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/tests/data/small.log");
+const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/robot/tests/data/small.log");
 
 /// Streams, data and output of the demo.
 const TOPICS: [&str; 7] = [

@@ -7,7 +7,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/tests/data/small.log");
+const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/robot/tests/data/small.log");
 
 /// What the demo draws into.
 const FILE: &str = "rohrpost-demo.rrd";

@@ -40,11 +40,11 @@ pub(super) fn load(file: &Path) -> Result<Installation, Errors> {
 /// # Errors
 /// Everything that they would refuse, by line.
 pub(super) fn validate(installation: Installation) -> Result<Installation, Errors> {
-    let problems = rohrpost_modules::builtin::check(&installation);
+    let problems = rohrpost_builtin::check(&installation);
     if !problems.is_empty() {
         return Err(Errors::new(&installation.path, problems));
     }
-    let problems = rohrpost_modules::builtin::check_saved(&installation);
+    let problems = rohrpost_builtin::check_saved(&installation);
     match &installation.saved {
         Some(saved) if !problems.is_empty() => Err(Errors::new(&saved.path, problems)),
         _ => Ok(installation),

@@ -250,9 +250,7 @@ fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     let bridge = match &machine.asked.bridge {
         Some(Bridge { path, pid: Some(pid) }) => Finding::ok(what, format!("{}, process {pid}", path.display()), why),
         Some(Bridge { path, pid: None }) => Finding::ok(what, path.display().to_string(), why),
-        None => {
-            missing(what, why, "cargo build -p rohrpost-gui-bridge, then PATH=target/debug:$PATH")
-        }
+        None => missing(what, why, "cargo build -p rohrpost-gui-bridge, then PATH=target/debug:$PATH"),
     };
     let (what, why) = ("viewer", "shows drawings, live or from a file");
     let viewer = match &machine.asked.viewer {

@@ -4,8 +4,8 @@ use super::super::target::Target;
 use crate::terminal::Failure;
 use rohrpost::output::plain;
 use rohrpost::schema::Description;
+use rohrpost_builtin as builtin;
 use rohrpost_config::{Installation, Program};
-use rohrpost_modules::builtin;
 
 /// The interface of a module (`motor.0`) or class (`motor`). What runs is asked first; the programs of the built-in
 /// modules are known without that, those of others are not.

@@ -3,7 +3,8 @@
 use super::arguments::Arguments;
 use super::filter::Filter;
 use crate::terminal::{complain, say};
-use rohrpost::output::{Format, OutputLine};
+use rohrpost::output::OutputLine;
+use rohrpost_builtin::format::Format;
 
 /// The selected lines and their format.
 pub(super) struct Show<'a> {

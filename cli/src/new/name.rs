@@ -53,7 +53,7 @@ impl FromStr for ModuleName {
         match text {
             "tool" => Err(NameError::Class(own(), "programs run by hand")),
             "output" => Err(NameError::Class(own(), "the collector of the modules' output")),
-            _ => match rohrpost_modules::builtin::of_class(text) {
+            _ => match rohrpost_builtin::of_class(text) {
                 Some(builtin) => Err(NameError::BuiltIn(own(), builtin)),
                 None => Ok(Self(own())),
             },

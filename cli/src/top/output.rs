@@ -5,7 +5,8 @@ use super::draw::OutputText;
 use rohrpost::Name;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CollectorInterface, Page};
-use rohrpost::output::{Format, OutputLine};
+use rohrpost::output::OutputLine;
+use rohrpost_builtin::format::Format;
 use rohrpost_config::Installation;
 use std::collections::VecDeque;
 

@@ -3,8 +3,9 @@
 use super::super::table;
 use super::columns::{Column, short};
 use super::model::{Model, TimeNow};
-use rohrpost::output::{iso, plain};
+use rohrpost::output::plain;
 use rohrpost::survey::Standing;
+use rohrpost_builtin::format::iso;
 
 /// A moment to the second, such as `2026-11-21 10:40:12 UTC`.
 pub(super) fn date(time_ns: u64) -> String {

@@ -14,7 +14,7 @@ const LATEST_NS: u64 = 5 * SECOND_NS;
 ///
 /// It is a bucket of tokens, seen from the other side: the time at which it will be full again says how many are
 /// missing (the generic cell rate algorithm). So one number is all of it, and taking is one compare-and-swap.
-pub(crate) struct Bucket {
+pub struct Bucket {
     /// A token drips in so often.
     interval_ns: u64,
     /// How far in the future it may be full for one token to be left.
@@ -23,14 +23,15 @@ pub(crate) struct Bucket {
 }
 
 impl Bucket {
-    pub(crate) fn new(rate_per_s: u32, burst: u32) -> Self {
+    /// So many lines a second, and so many at once.
+    pub fn new(rate_per_s: u32, burst: u32) -> Self {
         let interval_ns = SECOND_NS / u64::from(rate_per_s.max(1));
         let room_ns = interval_ns * u64::from(burst.max(1) - 1);
         Self { interval_ns, room_ns, full_at_ns: AtomicU64::new(0) }
     }
 
     /// Takes a token; false when there is none.
-    pub(crate) fn take(&self, now_ns: u64) -> bool {
+    pub fn take(&self, now_ns: u64) -> bool {
         let next = |full_at_ns: u64| {
             let full_at_ns = full_at_ns.max(now_ns);
             (full_at_ns - now_ns <= self.room_ns).then_some(full_at_ns + self.interval_ns)

@@ -100,7 +100,7 @@ fn level_of_event(level: &tracing::Level) -> OutputLevel {
 }
 
 /// What is too long ends with a `…`, never inside a character.
-pub(crate) fn cut(mut text: String) -> String {
+pub fn cut(mut text: String) -> String {
     if text.len() > TEXT_MAX {
         let end = (0..=TEXT_MAX - 4).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
         text.truncate(end);

@@ -1,7 +1,7 @@
 //! What modules say, on its way to the output collector (seed 002, 2.2.4).
 //!
 //! ```text
-//!  tracing event ─▶ layer: level? ─▶ allowance ─▶ way: queue ─▶ mailbox output.0.3 ─▶ builtin::output
+//!  tracing event ─▶ layer: level? ─▶ allowance ─▶ way: queue ─▶ mailbox output.0.3 ─▶ modules/builtin
 //!  panic ──────────────────────────────▲             ring, file, journal, subscribers, `rohrpost log` ◀┘
 //! ```
 //!
@@ -11,9 +11,9 @@
 //! there is room.
 
 mod allowance;
+#[doc(hidden)]
+pub mod collector_support;
 mod errno;
-#[cfg(feature = "builtin")]
-mod format;
 mod layer;
 mod out;
 pub mod plain;
@@ -24,16 +24,12 @@ mod trace;
 mod way;
 
 pub use errno::{errno_of, errno_text};
-#[cfg(feature = "builtin")]
-pub use format::{Format, iso};
 pub(crate) use print::print;
 pub(crate) use relay::{OutputProxy, Relay, WeakOutputProxy};
 pub(crate) use trace::LINES_MAX as TRACE_LINES_MAX;
 pub(crate) use way::install_quiet;
 pub(crate) use way::is_installed;
 pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppressed};
-#[cfg(feature = "builtin")]
-pub(crate) use {allowance::Bucket, layer::cut, way::LANES, way::WAITING_LINES};
 
 use crate::common::OutputLevel;
 use rohrpost_mailbox::Name;

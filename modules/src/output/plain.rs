@@ -28,7 +28,7 @@ pub fn line(text: &str) -> Cow<'_, str> {
 }
 
 /// Appends a character as [`line`] writes it.
-pub(super) fn put(c: char, to: &mut String) {
+fn put(c: char, to: &mut String) {
     // Writing to a string does not fail.
     let _ = write_plain(c, to);
 }

@@ -17,11 +17,9 @@ use std::time::{Duration, Instant};
 /// Lines that wait in this process while the collector is not there or has no room: panics, errors, others.
 const WAITING_MAX: [usize; 3] = [16, 64, 256];
 /// All of these.
-#[cfg(feature = "builtin")]
-pub(crate) const WAITING_LINES: u64 = (WAITING_MAX[0] + WAITING_MAX[1] + WAITING_MAX[2]) as u64;
+pub const WAITING_LINES: u64 = (WAITING_MAX[0] + WAITING_MAX[1] + WAITING_MAX[2]) as u64;
 /// Each has the allowance of configuration.
-#[cfg(feature = "builtin")]
-pub(crate) const LANES: u64 = Lane::ALL.len() as u64;
+pub const LANES: u64 = Lane::ALL.len() as u64;
 /// How soon one that had no room is tried again.
 const RETRY_FULL: Duration = Duration::from_millis(20);
 /// How long a process that ends gives its last lines to find the collector.

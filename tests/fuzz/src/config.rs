@@ -1,8 +1,8 @@
 //! Whole configuration files: an installation, or its mistakes, line by line; and all output of `rohrpost check`.
 
 use crate::split;
+use rohrpost_builtin::{check, check_saved};
 use rohrpost_config::{Errors, Installation, Problem, Saved, explain};
-use rohrpost_modules::builtin::{check, check_saved};
 
 pub(crate) fn run(data: &[u8]) {
     let Some((text, saved)) = split::texts(data) else { return };

@@ -1,8 +1,9 @@
 //! Output of modules: lines and pages of lines, from any process, as the collector and `rohrpost log` show them.
 
+use rohrpost_builtin::format::Format;
 use rohrpost_config::Installation;
 use rohrpost_modules::interfaces::Page;
-use rohrpost_modules::output::{Format, OutputLine};
+use rohrpost_modules::output::OutputLine;
 use std::sync::LazyLock;
 
 const CONFIG: &str = include_str!("../corpus/config/small.toml");

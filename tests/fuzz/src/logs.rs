@@ -1,9 +1,9 @@
 //! Logs of CARMEN, as the demonstration plays them: read, believed or not, played, and drawn into a map.
 
 use rohrpost_modules::fusion::{History, Records, Stamp};
-use rohrpost_modules::robot::carmen::{LogError, LogRecord, Reader, Settings};
-use rohrpost_modules::robot::grid::{Mapper, Settings as GridSettings};
-use rohrpost_modules::robot::playback::Playback;
+use rohrpost_robot::carmen::{LogError, LogRecord, Reader, Settings};
+use rohrpost_robot::grid::{Mapper, Settings as GridSettings};
+use rohrpost_robot::playback::Playback;
 
 /// Scans that are drawn of one input: each may touch some thousand cells.
 const SCANS: usize = 4;

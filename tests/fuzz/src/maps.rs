@@ -1,6 +1,6 @@
 //! Maps of the simulated world: a world, or what is wrong with the text.
 
-use rohrpost_modules::robot::world::{MapError, World};
+use rohrpost_robot::world::{MapError, World};
 
 pub(crate) fn run(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };

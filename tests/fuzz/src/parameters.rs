@@ -3,8 +3,8 @@
 
 use crate::config::validate;
 use crate::split;
+use rohrpost_builtin::check_saved;
 use rohrpost_config::{Installation, Saved};
-use rohrpost_modules::builtin::check_saved;
 use rohrpost_modules::parameter::{from_file, from_word, toml_text, value_text};
 use rohrpost_modules::schema::{Schema, Type, Value, decode};
 use rohrpost_modules::types::Twist;
