@@ -21,11 +21,12 @@ const LICENCES: [&str; 9] = [
 ];
 
 /// Crates in two versions, with the reason.
-const DOUBLED: [(&str, &str); 6] = [
+const DOUBLED: [(&str, &str); 7] = [
     ("darling", "mcap's enumset stays at 0.21, ratatui's macros take 0.24; only the compiler runs them"),
     ("darling_core", "the same"),
     ("darling_macro", "the same"),
     ("getrandom", "ring 0.17 stays at 0.2, tempfile takes 0.4"),
+    ("rand_core", "rand 0.9 stays at 0.9, getrandom 0.4 as proptest asks for it takes 0.10"),
     ("signal-hook", "crossterm 0.29, the terminal of `top`, stays at 0.3"),
     ("syn", "clap_derive takes 3, all other macros 2; only the compiler runs them"),
 ];
@@ -107,6 +108,53 @@ fn the_author_of_a_module_compiles_no_tool() {
         assert!(all.iter().any(|its| its.name == package));
         let found: Vec<&str> = all.iter().map(|its| its.name.as_str()).filter(|name| unwanted.contains(name)).collect();
         assert!(found.is_empty(), "{package} also compiles {found:?}");
+    }
+}
+
+/// Crates that Cargo compiles for what these arguments select, each with the sets of features that it is compiled with:
+/// one for the programs and one for macros, if they differ.
+fn features_for(selection: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["tree", "--prefix", "none", "--format", "{p}|{f}"]).args(selection);
+    let output = cargo.current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for line in String::from_utf8(output.stdout).unwrap().lines() {
+        // Between the crates stand lines such as `[dev-dependencies]`.
+        let Some((what, features)) = line.trim_end_matches(" (*)").split_once('|') else { continue };
+        // `name v1.2.3`; behind it stands where it is, or that it is a macro.
+        let what = what.split(' ').take(2).collect::<Vec<_>>().join(" ");
+        all.entry(what).or_default().insert(features.into());
+    }
+    all
+}
+
+/// Cargo compiles a crate once more for each set of features, and with it all that needs it.
+#[test]
+fn demo_build_example_and_test_compile_no_crate_twice() {
+    let test = features_for(&["--edges", "all"]);
+    for (command, selection) in [
+        ("cargo demo", &["--edges", "normal,build", "--package", "rohrpost-cli"][..]),
+        ("cargo build", &["--edges", "normal,build"]),
+        (
+            "cargo xtask test",
+            &[
+                "--edges=all",
+                "--workspace",
+                "--exclude=rohrpost-gui-bridge",
+                "--exclude=rohrpost-bench",
+                "--exclude=rohrpost-proof-loom",
+            ],
+        ),
+    ] {
+        let all = features_for(selection);
+        assert!(all.len() > 100, "cargo tree is read no more: {}", all.len());
+        let differ: Vec<_> = all
+            .iter()
+            .filter_map(|(name, sets)| Some((name, sets, test.get(name)?)))
+            .filter(|(_, sets, tested)| !sets.is_subset(tested))
+            .collect();
+        assert!(differ.is_empty(), "features for `{command}`, then for `cargo test`: {differ:#?}");
     }
 }
 

@@ -12,8 +12,8 @@ pub(crate) const BRIDGE: &str = "rohrpost-gui-bridge";
 static CHECKED: OnceLock<()> = OnceLock::new();
 
 /// From now on, clippy is the compiler of the workspace's own crates, and its warnings are errors. So what is linted is
-/// what the tests use; a `cargo clippy` beside it would compile all once more, since it shares nothing with a build. And
-/// nothing is kept for a next compilation, which costs a sixth of the first one.
+/// what the tests use; a `cargo clippy` beside it would compile all once more, since it shares nothing with a build.
+/// And nothing is kept for a next compilation, which would make the first one slower.
 pub(crate) fn check_what_is_compiled() {
     CHECKED.get_or_init(|| ());
 }
@@ -35,8 +35,8 @@ pub(crate) fn target() -> PathBuf {
 pub(crate) fn cargo(args: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(args).current_dir(root()).env("CARGO_TARGET_DIR", target());
-    // What `cargo xtask` has told of this package. Build scripts (ring's) run anew if they see it once and then not, and
-    // so all would be compiled twice that needs them: by `cargo demo`, and by `cargo build` after it.
+    // What `cargo xtask` has told of this package. Build scripts (ring's) run anew if they see it once and then not, so
+    // all that needs them would be compiled twice: by `cargo demo`, and by `cargo build` after it.
     let ours = |name: &str| ["CARGO_PKG_", "CARGO_MANIFEST_", "CARGO_BIN_"].iter().any(|begin| name.starts_with(begin));
     for (name, _) in std::env::vars().filter(|(name, _)| ours(name)) {
         command.env_remove(name);

@@ -1,10 +1,10 @@
 //! `cargo xtask test` and `cargo xtask ci`.
 //!
-//! What a stage needs is built once. Cargo takes what it has built if the profile, the selection of packages and thereby
-//! the features are the same; so each call selects all of the workspace, and those that want less name targets. The tests
-//! that look at whole drawings with Rerun's command line, and at recordings with Python's reader, are targets that run
-//! only if they are named. They find these programs by environment variables, and have to fail without them, saying `run
-//! them by "cargo xtask test --all"`.
+//! What a stage needs is built once. Cargo takes what it has built if the profile, the selection of packages and
+//! thereby the features are the same; so each call selects all of the workspace, and those that want less name targets.
+//! The tests that look at whole drawings with Rerun's command line, and at recordings with Python's reader, are targets
+//! that run only if they are named. They find these programs by environment variables, and have to fail without them,
+//! saying `run them by "cargo xtask test --all"`.
 
 use crate::cargo::{self, BRIDGE, cargo};
 use crate::failure::Failure;
@@ -17,8 +17,8 @@ use std::process::{Command, ExitCode};
 
 /// The bench, with its peers: some 70 crates.
 const BENCH: &str = "rohrpost-bench";
-/// The model of the slot core. Its model checker asks for features of others' crates, with which Cargo would compile ours
-/// once more.
+/// The models of the slot core. Their model checker asks for features of others' crates, with which Cargo would compile
+/// ours once more.
 const LOOM: &str = "rohrpost-proof-loom";
 
 /// `cargo xtask test [--all]`: what a change to the product may break, or all tests.

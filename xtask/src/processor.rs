@@ -1,7 +1,7 @@
 //! Processor time, user's and kernel's: what a build or a test costs, also on a machine that does other things.
 //!
-//! The kernel adds a process's time to that of its parent when the parent waits for it. So what a stage has left running,
-//! and what ended without a parent that waits, is not counted.
+//! The kernel adds a process's time to that of its parent when the parent waits for it. So what a stage has left
+//! running, and what ended without a parent that waits, is not counted.
 
 use std::time::Duration;
 
@@ -24,7 +24,8 @@ fn times(pid: &str) -> Option<[Duration; 4]> {
 }
 
 fn read(stat: &str) -> Option<[Duration; 4]> {
-    // The second field is the program's name in brackets, and may hold spaces and brackets; the four are the 14th to 17th.
+    // The second field is the program's name in brackets, and may hold spaces and brackets; the four are the 14th to
+    // 17th.
     let (_, rest) = stat.rsplit_once(')')?;
     let mut fields = rest.split_whitespace().skip(11).map(|field| field.parse::<u32>().ok().map(|ticks| TICK * ticks));
     Some([fields.next()??, fields.next()??, fields.next()??, fields.next()??])

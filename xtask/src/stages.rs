@@ -58,8 +58,8 @@ fn outcome(stage: Stage) -> Outcome {
     Outcome { name: stage.name, budget_s: stage.budget_s, took, parts, result }
 }
 
-/// A stage fails at one and a half of its budget: what makes it dearer is to be mended, or to be granted where the
-/// budget stands.
+/// A stage fails at one and a half of its budget. Either what made it dearer is a mistake, or it is worth it; then the
+/// budget is raised, with the reason in the commit.
 fn within(stage: &Stage, processor: Duration) -> Result<(), Failure> {
     let Stage { name, budget_s, .. } = stage;
     let took_s = processor.as_secs();
