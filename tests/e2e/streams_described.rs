@@ -162,11 +162,14 @@ fn a_time_without_a_value_says_exactly_why_and_one_to_come_is_waited_for() {
     let (mut launch, robot) = launched(&place);
     let found = value_on_the_way(&place);
     let (at, ns) = ("--at", found["stamp_ns"].to_string());
+    let [before_ns, after_ns] = ["before", "after"].map(|side| found[side]["stamp_ns"].as_u64().unwrap());
+    let gap_ns = after_ns - before_ns;
+    let gap = format!("that time lies in a gap of {}.{:09} s", gap_ns / 1_000_000_000, gap_ns % 1_000_000_000);
     for (stream, more, words) in [
         (ODOMETRY, &[at, "1.0"][..], "odometry.0 odometry: the record before that time is not there"),
         (ODOMETRY, &[at, "+1h"], "odometry.0 odometry: not yet: nearer records may come until stamps are at most 3600"),
         (ODOMETRY, &[at, "+1h", "--wait", "50ms"], "not yet"),
-        (ODOMETRY, &[at, &ns, "--gap", "1us"], "that time lies in a gap of 0.0"),
+        (ODOMETRY, &[at, &ns, "--gap", "1us"], &gap),
         (ODOMETRY, &[at, &ns, "--epoch", "99"], "no two records of epoch 99 are around that time"),
         (["odometry.0", "odometer"], &[at, &ns], "odometry.0 has no stream `odometer`; it has: odometry"),
         (["odometry.0", "7"], &[at, &ns], "odometry.0 has no stream 7; it has 1"),
