@@ -9,6 +9,7 @@ use super::summary::{ModuleLine, module_lines, print_modules_live};
 use crate::terminal::Failure;
 pub(super) use all::{LaunchedNodes, lab};
 use rohrpost::launch::{Launch, choose_node, events};
+use rohrpost::launcher::Phase;
 use rohrpost::output::plain::Lines;
 use rohrpost::survey::Survey;
 use rohrpost_config::{Installation, Keys};
@@ -143,7 +144,7 @@ impl<'a> TerminalView<'a> {
     /// All modules are on. Without a table, one line says so.
     fn began(&self, launch: &Launch, node: &str) {
         if !self.live {
-            let modules = launch.phases().count();
+            let modules = launch.phases().filter(|(_, phase)| *phase != Phase::LeftOut).count();
             let word = if modules == 1 { "module" } else { "modules" };
             let runs = all::runs(node, &launch.installation().name);
             self.speech.say(&format!("{runs}: {modules} {word}"));
