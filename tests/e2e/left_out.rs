@@ -2,8 +2,10 @@
 
 use crate::harness::{OUTPUT, Place, probe, signal, wait};
 use crate::process::Running;
+use crate::terminal::Terminal;
 use nix::sys::signal::Signal;
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// A probe with a program of this name in place of this test's path.
@@ -119,4 +121,33 @@ fn a_program_that_disappears_while_its_module_runs_is_no_reason_to_leave_it_out(
     launch.signal(Signal::SIGINT);
     assert_eq!(launch.end().code(), Some(1), "it has failed");
     assert!(launch.err().contains("probe.1 failed for good: could not be started"), "{}", launch.err());
+}
+
+/// What `cargo demo` does: the GUI's program is built beside the robot.
+#[test]
+fn a_demo_shows_how_far_its_gui_is_until_that_joins() {
+    let place = Place::new();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
+    let demo = fs::read_to_string(folder.join("demo.toml")).unwrap();
+    let demo = demo.replace("program = \"rohrpost-gui-bridge\"", "program = \"../late\"");
+    fs::create_dir(place.path("config")).unwrap();
+    fs::write(place.path("config/demo.toml"), demo).unwrap();
+    fs::copy(folder.join("building.map"), place.path("config/building.map")).unwrap();
+    fs::write(place.path("build.log"), "nice cargo build\n12 of 433 crates\n").unwrap();
+    let said = place.say(&["demo", "--quiet", "--seconds", "0.1", "--gui-build", "build.log"]).ok();
+    assert!(said.contains("\nGUI bridge: 12 of 433 crates (build.log)\n"), "why there is no drawing: {said}");
+
+    let (terminal, mut demo) = Terminal::start(&place, &["demo", "--gui-build", "build.log"], 30, 120);
+    terminal.wait_screen("how far it is", |screen| screen.contains("GUI bridge: 12 of 433 crates (build.log)"));
+    fs::write(place.path("build.log"), "13 of 433 crates\n14 of").unwrap();
+    terminal.wait_screen("that it goes on", |screen| screen.contains("GUI bridge: 13 of 433 crates (build.log)"));
+    // No module, but a program; it is never ready.
+    fs::write(place.path("late"), "#!/bin/sh\nexec sleep 1000\n").unwrap();
+    fs::set_permissions(place.path("late"), fs::Permissions::from_mode(0o755)).unwrap();
+    place.say(&["start", "gui.0", "--no-wait"]).ok();
+    terminal.wait_screen("that it has joined", |screen| {
+        !screen.contains("GUI bridge") && screen.contains("gui.0 was left out and is started")
+    });
+    demo.signal(Signal::SIGINT);
+    demo.end();
 }
