@@ -7,6 +7,7 @@ mod beyond;
 mod copy;
 mod drawing;
 mod folder;
+mod gui_build;
 mod incarnations;
 mod losses;
 mod masters;
@@ -64,6 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?, &resolved)?;
     let outcome = watch(arguments, long, &mut launch, &speech);
     let summary = summary(&mut launch);
+    let gui_build = gui_build::progress(arguments.gui_build.as_deref(), &launch);
     let code = end(launch, &speech);
     speech.settle();
     let recorded = recording.map(DemoRecording::end);
@@ -71,6 +73,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let (text, well) = summary?;
     say(text.trim_end());
     drawn(drawing, begun);
+    if let Some(line) = gui_build {
+        say(line);
+    }
     if let Some(recorded) = recorded {
         say(recorded?);
     }
@@ -84,7 +89,7 @@ fn watch(arguments: &Arguments, long: Option<Duration>, launch: &mut Launch, spe
     let mut ask_at = Instant::now();
     let mut over = false;
     while launch.watch(view.wait()) {
-        view.show(launch)?;
+        view.show_with(launch, |launch| gui_build::progress(arguments.gui_build.as_deref(), launch))?;
         if !over && Instant::now() >= ask_at {
             ask_at = Instant::now() + Duration::from_millis(500);
             over = progress(launch).is_some_and(|progress| progress.finished);

@@ -9,6 +9,7 @@ use super::summary::{ModuleLine, module_lines, print_modules_live};
 use crate::terminal::Failure;
 pub(super) use all::{LaunchedNodes, lab};
 use rohrpost::launch::{Launch, choose_node, events};
+use rohrpost::launcher::Phase;
 use rohrpost::output::plain::Lines;
 use rohrpost::survey::Survey;
 use rohrpost_config::{Installation, Keys};
@@ -143,7 +144,7 @@ impl<'a> TerminalView<'a> {
     /// All modules are on. Without a table, one line says so.
     fn began(&self, launch: &Launch, node: &str) {
         if !self.live {
-            let modules = launch.phases().count();
+            let modules = launch.phases().filter(|(_, phase)| *phase != Phase::LeftOut).count();
             let word = if modules == 1 { "module" } else { "modules" };
             let runs = all::runs(node, &launch.installation().name);
             self.speech.say(&format!("{runs}: {modules} {word}"));
@@ -157,6 +158,15 @@ impl<'a> TerminalView<'a> {
 
     /// Shows the news, if it is time.
     pub(super) fn show(&mut self, launch: &mut Launch) -> Result<(), Failure> {
+        self.show_with(launch, |_| None)
+    }
+
+    /// Shows the news, if it is time, and in the live table this line below its head.
+    pub(super) fn show_with(
+        &mut self,
+        launch: &mut Launch,
+        line: impl FnOnce(&Launch) -> Option<String>,
+    ) -> Result<(), Failure> {
         let notes = launch.take_notes();
         if !self.live {
             notes.iter().for_each(|note| self.speech.say(note));
@@ -171,18 +181,20 @@ impl<'a> TerminalView<'a> {
         }
         let survey = launch.survey()?;
         let lines = module_lines(launch.installation(), &survey, self.last.as_ref());
-        self.draw(&launch.installation().name, &lines);
+        let line = line(launch).map_or_else(String::new, |line| format!("{line}\n"));
+        self.draw(&launch.installation().name, &line, &lines);
         self.last = Some(survey);
         Ok(())
     }
 
-    fn draw(&mut self, installation: &str, lines: &[ModuleLine]) {
+    /// `line`: a whole line below the head, or nothing.
+    fn draw(&mut self, installation: &str, line: &str, lines: &[ModuleLine]) {
         let excess = self.notes.len().saturating_sub(NOTES_MAX);
         self.notes.drain(..excess);
         let head = format!("{installation}, {} s. Ctrl-C stops it.", self.begun.elapsed().as_secs());
         // Home, then clear each line to its end, then everything below: no flicker. Long lines are cut, not wrapped, so
         // that the table keeps its shape.
-        let text = format!("{head}\n\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
+        let text = format!("{head}\n{line}\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
         let text = Lines(text).to_string().replace('\n', "\x1b[K\n");
         let first = if self.last.is_none() { "\x1b[2J" } else { "" };
         self.speech.draw(format!("{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J"));

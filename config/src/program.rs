@@ -1,7 +1,7 @@
 //! Location of a module's program on this computer. Only the node that runs a module looks it up.
 
 use crate::installation::Installation;
-use crate::module::Program;
+use crate::module::{Module, Program};
 use rohrpost_mailbox::Name;
 use std::ffi::OsStr;
 use std::os::unix::fs::PermissionsExt;
@@ -16,6 +16,8 @@ pub struct MissingProgram {
     pub optional: bool,
     /// The program, as the file names it.
     pub program: String,
+    /// Where it was looked for: `is neither in /opt/robot nor on PATH`.
+    pub place: String,
     /// What to tell the user, with file and line.
     pub message: String,
 }
@@ -54,36 +56,45 @@ impl Installation {
     /// The modules of a node without their programs on this computer, in the order of the file. `beside` is the folder
     /// of the running executable.
     pub fn missing_programs(&self, node: &str, beside: &Path) -> Vec<MissingProgram> {
-        let mut missing = Vec::new();
-        for module in self.modules_on(node) {
-            let Program::Command(words) = &module.program else { continue };
-            let Some(program) = words.first() else { continue };
-            if find_program(program, &self.folder, beside).is_some() {
-                continue;
-            }
-            let place = if program.contains('/') {
-                format!("is no program at {}", below(&self.folder, program).display())
-            } else {
-                format!("is neither in {} nor on PATH", beside.display())
-            };
-            let right = if module.optional {
-                "the module is left out, since it is optional"
-            } else {
-                "build or install it, or correct `program`"
-            };
-            missing.push(MissingProgram {
-                module: module.name,
-                optional: module.optional,
-                program: program.clone(),
-                message: format!(
-                    "{}:{}: module `{}`: `{program}` {place}; {right}",
-                    self.shown.display(),
-                    module.line,
-                    self.classes.format(module.name)
-                ),
-            });
+        self.modules_on(node).filter_map(|module| self.missing_program(module, beside)).collect()
+    }
+
+    /// What to tell of a module without its program on this computer; none if the program is there, or built in.
+    /// `beside` is the folder of the running executable.
+    ///
+    /// ```
+    /// # use rohrpost_config::{Installation, Module};
+    /// fn why(installation: &Installation, module: &Module) -> Option<String> {
+    ///     let beside = std::path::Path::new("/opt/robot");
+    ///     let missing = installation.missing_program(module, beside)?;
+    ///     Some(format!("`{}` {}", missing.program, missing.place)) // `planner` is neither in /opt/robot nor on PATH
+    /// }
+    /// ```
+    pub fn missing_program(&self, module: &Module, beside: &Path) -> Option<MissingProgram> {
+        let Program::Command(words) = &module.program else { return None };
+        let program = words.first()?;
+        if find_program(program, &self.folder, beside).is_some() {
+            return None;
         }
-        missing
+        let place = if program.contains('/') {
+            format!("is no program at {}", below(&self.folder, program).display())
+        } else {
+            format!("is neither in {} nor on PATH", beside.display())
+        };
+        let right = if module.optional {
+            "the module is left out, since it is optional"
+        } else {
+            "build or install it, or correct `program`"
+        };
+        let (file, name) = (self.shown.display(), self.classes.format(module.name));
+        let message = format!("{file}:{}: module `{name}`: `{program}` {place}; {right}", module.line);
+        Some(MissingProgram {
+            module: module.name,
+            optional: module.optional,
+            program: program.clone(),
+            place,
+            message,
+        })
     }
 }
 

@@ -34,6 +34,8 @@ pub enum Phase {
     Ended,
     /// Ended, and not to be started again.
     Failed,
+    /// Optional, and its program was not there when launch began; a start looks for the program again.
+    LeftOut,
 }
 
 impl Phase {
@@ -48,6 +50,7 @@ impl Phase {
             Self::Stopped => "stopped",
             Self::Ended => "ended",
             Self::Failed => "failed",
+            Self::LeftOut => "left out",
         }
     }
 
@@ -59,7 +62,7 @@ impl Phase {
     /// assert!(Phase::Failed.is_over() && !Phase::Starting.is_over());
     /// ```
     pub const fn is_over(self) -> bool {
-        matches!(self, Self::Stopped | Self::Ended | Self::Failed)
+        matches!(self, Self::Stopped | Self::Ended | Self::Failed | Self::LeftOut)
     }
 }
 
@@ -99,14 +102,13 @@ pub struct Children {
     pub states: Vec<ChildState>,
 }
 
-/// Why launch did not do what it was asked. The text is the module's name.
+/// Why launch did not do what it was asked. A text without a name is the module's name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema, thiserror::Error)]
 pub enum ControlError {
     /// Not one of its modules.
     #[error(
-        "launch watches over no module `{0}` on this node: it is on another one, left out since its program is \
-         missing, \
-         or not in the configuration; `rohrpost list` shows which there are"
+        "launch watches over no module `{0}` on this node: it is on another one, or not in the configuration; \
+         `rohrpost list` shows which there are"
     )]
     NoModule(String),
     /// It is to be started, and runs.
@@ -118,6 +120,19 @@ pub enum ControlError {
     /// It is to be stopped, and has ended by itself.
     #[error("{0} has ended already, and is not started again by itself; `rohrpost start {0}` starts it")]
     Ended(String),
+    /// It is to be stopped, and was left out.
+    #[error("{0} is left out and never ran, since its program is missing; `rohrpost start {0}` looks for it again")]
+    LeftOut(String),
+    /// It is to be started, was left out, and its program is still missing.
+    #[error("{module} stays left out: for launch `{program}` {place}; build or install it, then `rohrpost start {module}`")]
+    NoProgram {
+        /// The module.
+        module: String,
+        /// Its program, as the configuration names it.
+        program: String,
+        /// Where launch looked for it.
+        place: String,
+    },
     /// Launch stops all modules.
     #[error("launch is ending; it stops {0} like all others")]
     Ending(String),
@@ -201,7 +216,8 @@ pub trait Launcher {
     #[command(18)]
     fn stop(&mut self, module: String) -> Result<(), ControlError>;
 
-    /// Starts a module that has ended, was stopped, or waits to be started again. Answers as `restart` does.
+    /// Starts a module that has ended, was stopped, was left out, or waits to be started again. Answers as `restart`
+    /// does.
     #[command(19)]
     fn start(&mut self, module: String) -> Result<u32, ControlError>;
 

@@ -35,6 +35,7 @@ mod lan_tools;
 mod languages;
 mod languages_killed;
 mod launch;
+mod left_out;
 mod lines;
 mod log_file;
 mod log_time;

@@ -4,9 +4,11 @@
 //! anything else, and that should take a second.
 #![forbid(unsafe_code)]
 
+mod beside;
 mod c_client;
 mod cargo;
 mod checks;
+mod crates;
 mod demo;
 mod failure;
 mod fuzz;
@@ -24,7 +26,8 @@ use std::process::ExitCode;
 const HELP: &str = "\
 cargo demo [--no-gui] [ARGS...]   the same as `cargo xtask demo`
 cargo xtask demo [--no-gui] [ARGS...]
-    Builds `rohrpost` and, unless --no-gui is given, the GUI bridge; then runs `rohrpost demo ARGS...`.
+    Builds `rohrpost` and runs `rohrpost demo ARGS...`. The GUI bridge is built before, or, if the demo runs until
+    Ctrl-C, beside it, and joins it; with --no-gui not at all.
 cargo xtask test [--all]
     All tests that a change to the product may break. With --all also those of the bench and of the GUI bridge, the slot
     core under ThreadSanitizer, instructions of the hot paths, a short run of the fuzz targets, and drawings with
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
     let (command, rest) = args.split_first().map_or(("help", &[][..]), |(first, rest)| (first.as_str(), rest));
     let done = match command {
         "demo" => demo::run(rest),
+        beside::COMMAND => beside::run(rest),
         "test" => checks::test(rest),
         "ci" => Ok(checks::ci()),
         "fuzz" => fuzz::run(rest),

@@ -61,6 +61,9 @@ pub(crate) struct Arguments {
     /// Leave the GUI out.
     #[arg(long, conflicts_with = "viewer")]
     pub(super) no_gui: bool,
+    /// The GUI's program is being built, and may join later: show the last line of this file until it does.
+    #[arg(long, hide = true, value_name = "FILE", conflicts_with_all = ["no_gui", "nodes"])]
+    pub(super) gui_build: Option<PathBuf>,
     /// No live table, only events.
     #[arg(long)]
     pub(super) quiet: bool,

@@ -135,7 +135,7 @@ fn remove(modules: &mut ArrayOfTables, at: usize) {
     }
 }
 
-fn is_gui(name: &str) -> bool {
+pub(super) fn is_gui(name: &str) -> bool {
     name.split('.').next() == Some(GUI)
 }
 

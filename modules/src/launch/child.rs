@@ -94,7 +94,14 @@ pub(super) struct Child {
 }
 
 impl Child {
-    pub(super) fn new(module: &Module, installation: &Installation, program: Program, relay: &Relay) -> Self {
+    /// `is_missing`: its program is not there, and it is left out until somebody starts it.
+    pub(super) fn new(
+        module: &Module,
+        installation: &Installation,
+        program: Program,
+        relay: &Relay,
+        is_missing: bool,
+    ) -> Self {
         let configured_on = module.start == Start::On;
         Self {
             name: module.name,
@@ -109,7 +116,7 @@ impl Child {
             required: module.required,
             ready_within: module.ready_within,
             stop_within: module.stop_within,
-            phase: Phase::Waiting,
+            phase: if is_missing { Phase::LeftOut } else { Phase::Waiting },
             process: None,
             mailboxes: Mailboxes::None,
             over: None,
@@ -134,6 +141,10 @@ impl Child {
 
     pub(super) fn phase(&self) -> Phase {
         self.phase
+    }
+
+    pub(super) fn program(&mut self) -> &mut Program {
+        &mut self.program
     }
 
     pub(super) fn restarts(&self) -> u32 {

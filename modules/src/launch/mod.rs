@@ -5,8 +5,9 @@
 //! Waiting ─────────▶ Starting ───────────────▶ Ready ──────▶ Running ──▶ ended ── policy ──▶ Ended, Failed
 //!    ▲                                                           │           │ backoff
 //!    ├───────────────────────────────────────────────────────────│───────────┘
-//!    └── restart, start ── Stopping ◀── told to, from any ───────┘
-//!                             └── stop ──▶ Stopped
+//!    ├── restart, start ── Stopping ◀── told to, from any ───────┘
+//!    │                        └── stop ──▶ Stopped
+//!    └── restart, start, if its program is there by now ── LeftOut
 //! ```
 //!
 //! One thread turns round and round: it looks after each module, moves the calls on that switch modules on, and answers
@@ -164,10 +165,10 @@ impl Launch {
         let relay = Relay::new(tool.link.participant(), tool.link.me());
         let children: Vec<Child> = installation
             .modules_on(node_name)
-            .filter(|module| missing.iter().all(|program| program.module != module.name))
             .map(|module| {
                 let program = Program::new(module, &installation, &executable, keep(module), usual_nice);
-                Child::new(module, &installation, program, &relay)
+                let is_missing = missing.iter().any(|missing| missing.module == module.name);
+                Child::new(module, &installation, program, &relay, is_missing)
             })
             .collect();
         // It holds launch's place on the node, which is to be given back if the start fails.
@@ -212,8 +213,8 @@ impl Launch {
         let now = Instant::now();
         self.known.write(&self.node, self.children.iter().map(|child| child.state(now)).collect());
         let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
-        let orders =
-            Orders { children, installation, node, node_name: &self.node_name, looks: &mut self.looks, ending };
+        let (looks, notes) = (&mut self.looks, &mut self.notes);
+        let orders = Orders { children, installation, node, node_name: &self.node_name, looks, notes, ending };
         self.counter.serve(orders, &mut self.tool.link);
     }
 

@@ -1,7 +1,7 @@
 //! A module's program, and what its process is told by its environment.
 
 use crate::runtime::environment;
-use rohrpost_config::{Installation, Module, Program as Configured, Scheduling, find_program};
+use rohrpost_config::{Installation, MissingProgram, Module, Program as Configured, Scheduling, find_program};
 use rohrpost_mailbox::sys;
 use std::io::{self, PipeWriter};
 use std::os::fd::OwnedFd;
@@ -22,9 +22,17 @@ pub(super) fn hurry() -> Option<i8> {
     may.then_some(usual)
 }
 
+/// Where the program of a command is; its bare name if it is nowhere.
+fn found(words: &[String], installation: &Installation, beside: &Path) -> PathBuf {
+    let program = words.first().map_or("", String::as_str);
+    find_program(program, &installation.folder, beside).unwrap_or_else(|| program.into())
+}
+
 /// How a module's process is started.
 pub(super) struct Program {
     path: PathBuf,
+    /// The folder of the `rohrpost` command, where a bare name is looked for first.
+    beside: PathBuf,
     arguments: Vec<String>,
     /// The configuration's file.
     config: PathBuf,
@@ -46,20 +54,29 @@ impl Program {
         kept: Vec<OwnedFd>,
         usual_nice: Option<i8>,
     ) -> Self {
-        let beside = executable.parent().unwrap_or(Path::new("."));
+        let beside = executable.parent().unwrap_or(Path::new(".")).to_owned();
         let (path, arguments) = match &module.program {
             Configured::Builtin(name) if !module.is_in_file() => (executable.to_owned(), vec![name.clone()]),
             Configured::Builtin(name) => (executable.to_owned(), vec!["run".to_owned(), name.clone()]),
             Configured::Command(words) => {
-                let program = words.first().map_or("", String::as_str);
-                let found = find_program(program, &installation.folder, beside);
-                (found.unwrap_or_else(|| program.into()), words.iter().skip(1).cloned().collect())
+                (found(words, installation, &beside), words.iter().skip(1).cloned().collect())
             }
         };
         let config = installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone());
         let is_real_time = matches!(installation.scheduling(module.name.class()), Scheduling::Fifo { .. });
         let nice = usual_nice.filter(|_| !is_real_time);
-        Self { path, arguments, config, module: installation.classes.format(module.name), kept, nice }
+        Self { path, beside, arguments, config, module: installation.classes.format(module.name), kept, nice }
+    }
+
+    /// Looks again for a program that was missing.
+    pub(super) fn look_again(&mut self, module: &Module, installation: &Installation) -> Result<(), MissingProgram> {
+        if let Some(missing) = installation.missing_program(module, &self.beside) {
+            return Err(missing);
+        }
+        if let Configured::Command(words) = &module.program {
+            self.path = found(words, installation, &self.beside);
+        }
+        Ok(())
     }
 
     pub(super) fn path(&self) -> &Path {

@@ -5,7 +5,7 @@ use super::look::{Looks, see};
 use crate::call::{Fault, Link};
 use crate::common;
 use crate::interface::{Interface, Serve};
-use crate::launcher::{Children, ControlError, Launcher, LauncherInterface};
+use crate::launcher::{Children, ControlError, Launcher, LauncherInterface, Phase};
 use crate::launcher::{LookError, LookPage, SnapshotRequest};
 use crate::runtime::refusals::{Cause, Refusals};
 use crate::runtime::server::{Command, CommandHandler, CommandServer, admit};
@@ -70,6 +70,8 @@ pub(super) struct Orders<'a> {
     pub(super) node: &'a Node,
     pub(super) node_name: &'a str,
     pub(super) looks: &'a mut Looks,
+    /// Events to show.
+    pub(super) notes: &'a mut Vec<String>,
     /// Launch stops all.
     pub(super) ending: bool,
 }
@@ -120,6 +122,27 @@ impl Orders<'_> {
         let child = self.children.iter_mut().find(|child| Some(child.name()) == name);
         child.ok_or_else(|| ControlError::NoModule(module.into()))
     }
+
+    /// Starts a module; one that runs is ended first, one that was left out needs its program by now. The number of the
+    /// process that is to come.
+    fn begin_anew(&mut self, module: &str) -> Result<u32, ControlError> {
+        let (node, installation) = (self.node, self.installation);
+        let child = self.find(module)?;
+        let was_left_out = child.phase() == Phase::LeftOut;
+        if was_left_out && let Some(configured) = installation.module(child.name()) {
+            child.program().look_again(configured, installation).map_err(|missing| ControlError::NoProgram {
+                module: child.text().into(),
+                program: missing.program,
+                place: missing.place,
+            })?;
+        }
+        child.tell_to_end(Then::Start, node, Instant::now());
+        let (text, incarnation) = (child.text().to_owned(), child.lives() + 1);
+        if was_left_out {
+            self.notes.push(format!("{text} was left out and is started, as asked: its program is there now"));
+        }
+        Ok(incarnation)
+    }
 }
 
 impl Launcher for Orders<'_> {
@@ -138,17 +161,15 @@ impl Launcher for Orders<'_> {
     }
 
     fn restart(&mut self, module: String) -> Result<u32, ControlError> {
-        let node = self.node;
-        let child = self.find(&module)?;
-        child.tell_to_end(Then::Start, node, Instant::now());
-        Ok(child.lives() + 1)
+        self.begin_anew(&module)
     }
 
     fn stop(&mut self, module: String) -> Result<(), ControlError> {
         let node = self.node;
         let child = self.find(&module)?;
         match child.phase() {
-            super::Phase::Stopped => Err(ControlError::Stopped(child.text().into())),
+            Phase::Stopped => Err(ControlError::Stopped(child.text().into())),
+            Phase::LeftOut => Err(ControlError::LeftOut(child.text().into())),
             phase if phase.is_over() => Err(ControlError::Ended(child.text().into())),
             _ => {
                 child.tell_to_end(Then::Stay, node, Instant::now());
@@ -158,13 +179,11 @@ impl Launcher for Orders<'_> {
     }
 
     fn start(&mut self, module: String) -> Result<u32, ControlError> {
-        let node = self.node;
         let child = self.find(&module)?;
         if child.is_at_work() {
             return Err(ControlError::Running(child.text().into()));
         }
-        child.tell_to_end(Then::Start, node, Instant::now());
-        Ok(child.lives() + 1)
+        self.begin_anew(&module)
     }
 
     fn look(&mut self, what: SnapshotRequest, form: u32, bytes_max: u16) -> Result<LookPage, LookError> {

@@ -62,7 +62,7 @@ impl Launch {
         loop {
             let child = &self.children[index];
             match child.phase() {
-                Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended => return Ok(()),
+                Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended | Phase::LeftOut => return Ok(()),
                 Phase::Failed if child.is_required() => return Err(not_ready(child, child.last_end())),
                 Phase::Failed => {
                     let note = format!("{} does not start; the others go on without it", child.text());
@@ -87,7 +87,8 @@ impl Launch {
     /// A node has not started if none of its modules starts.
     fn await_any(&mut self) -> Result<(), LaunchError> {
         let is_in_file = |child: &Child| self.installation.module(child.name()).is_some_and(Module::is_in_file);
-        let own: Vec<usize> = (0..self.children.len()).filter(|index| is_in_file(&self.children[*index])).collect();
+        let may_start = |child: &Child| is_in_file(child) && child.phase() != Phase::LeftOut;
+        let own: Vec<usize> = (0..self.children.len()).filter(|index| may_start(&self.children[*index])).collect();
         let work: Vec<usize> = own.iter().copied().filter(|index| !self.is_collector(&self.children[*index])).collect();
         let work = if work.is_empty() { own } else { work };
         let Some(first) = work.first().copied() else { return Ok(()) };

@@ -205,7 +205,9 @@ impl ModuleSurvey {
                 Standing::Restarting { attempt: child.attempt, most: child.attempts_max }
             }
             Phase::Waiting | Phase::Starting => Standing::Starting,
-            Phase::Ready | Phase::Running | Phase::Stopping | Phase::Stopped | Phase::Ended => Standing::Stopped,
+            Phase::Ready | Phase::Running | Phase::Stopping | Phase::Stopped | Phase::Ended | Phase::LeftOut => {
+                Standing::Stopped
+            }
         }
     }
 
@@ -235,9 +237,11 @@ impl ModuleSurvey {
         by_process.max(self.child.as_ref().map_or(0, |child| child.restarts))
     }
 
-    /// Whether it does not run and need not: it is optional, and its program most likely not there.
+    /// Whether it does not run and need not: it is optional, and its program is not there. Where no launch runs, that
+    /// is only likely.
     pub fn is_left_out(&self, installation: &Installation) -> bool {
         let is_optional = || installation.module(self.name).is_some_and(|configured| configured.optional);
-        self.at_ns.is_some() && self.process.is_none() && self.child.is_none() && is_optional()
+        let is_left_out = self.child.as_ref().map_or_else(is_optional, |child| child.phase == Phase::LeftOut);
+        self.at_ns.is_some() && self.process.is_none() && is_left_out
     }
 }
