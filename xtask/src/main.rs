@@ -31,10 +31,10 @@ cargo xtask demo [--no-gui] [ARGS...]
 cargo xtask test [--all]
     All tests that a change to the product may break. With --all also those of the bench and of the GUI bridge, the slot
     core under ThreadSanitizer, instructions of the hot paths, a short run of the fuzz targets, and drawings with
-    Rerun's command line. Every stage runs, even if one failed; a table of stages and their times, and what was skipped
-    or repeated, comes last.
+    Rerun's command line. Every stage runs, even if one failed; a table of stages, their times and processor times, and
+    what was skipped or repeated, comes last.
 cargo xtask ci
-    Format, clippy for both builds, then all tests.
+    Format, a build of all by clippy, then all tests with what was built.
 cargo xtask fuzz [TARGET...] [--seconds N] | --short
     Fuzzes each target, or those named, for so long (60 s), from where the last run ended; or as the tests do, a little.
 cargo xtask instructions [--record]
