@@ -2,8 +2,7 @@
 //! alone. The robot is on `base`; its file knows the laptop as a node that the TCP router reaches, and nothing is
 //! launched there.
 
-use crate::conforming;
-use crate::harness::{Place, Robot, halt, lab, signal, wait};
+use crate::harness::{Place, Robot, halt, lab, program, signal, wait};
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
 use rohrpost_routers::lab::Lab;
@@ -288,7 +287,7 @@ fn a_client_in_python_conforms_at_a_tcp_router() {
 #[test]
 fn rust_conforms_at_a_tcp_router_too() {
     let module =
-        format!("[[module]]\nname = \"probe.0\"\nnode = \"base\"\nprogram = {}\n", conforming::program());
+        format!("[[module]]\nname = \"probe.0\"\nnode = \"base\"\nprogram = {}\n", program("conforming::module"));
     let Some(scene) = Scene::with(OPEN, &module) else { return };
     let (run, me) = (repository().join("tests/conformance/run.py"), std::env::current_exe().unwrap());
     let client = [me.to_str().unwrap(), "--exact", "conforming::client", "--nocapture"];
