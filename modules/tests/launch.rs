@@ -108,7 +108,7 @@ fn ground(name: &str, manners: &[&str], more: &str) -> Ground {
     for (manner, (class, _)) in manners.iter().zip(CLASSES) {
         let command = match *manner {
             "cannot-run" => format!("['{}']", script(&traces).display()),
-            _ => format!("['{}', '--exact', 'role', '--nocapture']", program.display()),
+            _ => format!("['{}', '--exact', 'role', '--nocapture', '--test-threads', '2']", program.display()),
         };
         writeln!(text, "[[module]]\nname = \"{class}.0\"\nprogram = {command}\n{more}").unwrap();
         // Others end and become ready by themselves, however long a busy computer takes.

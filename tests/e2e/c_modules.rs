@@ -1,7 +1,7 @@
 //! Modules in C, the examples of `clients/c`, beside modules in Rust: compiled as the book says, launched, listed,
 //! called, killed, and with one stream that both read in place.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, runs, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, program, runs, signal, wait};
 use crate::process::Running;
 use crate::terminal::open_pair;
 use nix::sys::signal::Signal;
@@ -179,8 +179,7 @@ fn stop(place: &Place, robot: Robot, launch: &mut Running) {
 fn modules_in_rust_and_in_c_read_one_stream_in_place_that_a_camera_in_c_writes() {
     let place = Place::new();
     let [camera, viewer] = ["camera", "viewer"].map(|name| format!("{:?}", example(&place, name)));
-    let looker =
-        format!("[{:?}, \"--exact\", \"c_modules::module\", \"--nocapture\"]", std::env::current_exe().unwrap());
+    let looker = program("c_modules::module");
     let (mut launch, robot) = place.launched(&[
         CLASSES,
         &entry("camera.0", &camera, "[module.stream.image]\nrecord = \"256 KiB\"\nkeep = 4"),

@@ -14,12 +14,6 @@ use serde_json::{Value as Json, json};
 use std::io::{BufRead, Write};
 use std::time::{Duration, Instant};
 
-/// What the configuration says as the module's program.
-pub(crate) fn program() -> String {
-    let me = std::env::current_exe().unwrap();
-    format!("[{me:?}, \"--exact\", \"conforming::module\", \"--nocapture\"]")
-}
-
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {

@@ -86,9 +86,16 @@ pub(crate) fn lab<'a>(nodes: impl IntoIterator<Item = (&'a str, &'a str)>, what:
     }
 }
 
+/// What a configuration says as a module's program: a test of this binary, by its path, that is none when it is run as
+/// one. On one processor alone its name would stand before the first line that it prints, if it had one thread.
+pub(crate) fn program(test: &str) -> String {
+    let me = std::env::current_exe().unwrap();
+    format!("[{me:?}, \"--exact\", {test:?}, \"--nocapture\", \"--test-threads\", \"2\"]")
+}
+
 /// A table's line in a configuration: a probe with these settings and other keys.
 pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
-    let program = super::probe::program();
+    let program = program("probe::module");
     format!(
         "[[module]]\nname = \"{name}\"\nprogram = {program}\nsettings = {{ record = \"record\", {settings} }}\n{keys}\n"
     )

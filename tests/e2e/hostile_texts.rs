@@ -1,7 +1,7 @@
 //! Foreign texts in each tool: names, texts, units, values, faults and lines of a module that tries to control the
 //! terminal.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, program, wait};
 use crate::record::recording_that_says;
 use crate::replayed_others::bag_that_says;
 use rohrpost::interface::{Interface, Serve};
@@ -19,12 +19,6 @@ const HOSTILE: &str =
 const FAILS: u16 = 16;
 const TELLS: u16 = 17;
 const REFUSES: u16 = 18;
-
-/// As in `probe`: what launch starts.
-fn program() -> String {
-    let me = std::env::current_exe().unwrap();
-    format!("[{me:?}, \"--exact\", \"hostile_texts::module\", \"--nocapture\"]")
-}
 
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
@@ -183,7 +177,10 @@ const OWN_WORDS: [&str; 16] = [
 fn no_tool_lets_a_module_drive_the_terminal() {
     let place = Place::new();
     let module = |name: &str, fails: bool| {
-        format!("[[module]]\nname = \"{name}\"\nprogram = {}\nsettings = {{ fails = {fails} }}\n", program())
+        format!(
+            "[[module]]\nname = \"{name}\"\nprogram = {}\nsettings = {{ fails = {fails} }}\n",
+            program("hostile_texts::module")
+        )
     };
     let config = place.config(&[OUTPUT, &module("probe.0", false), &module("probe.1", true)]);
     let mut launch = place.launch(&config);

@@ -2,8 +2,7 @@
 //! alone. The robot is on `base`; its file knows the laptop as a node that the TCP router reaches, and nothing is
 //! launched there.
 
-use crate::conforming;
-use crate::harness::{Place, Robot, lab, signal, wait};
+use crate::harness::{Place, Robot, halt, lab, program, signal, wait};
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
 use rohrpost_routers::lab::Lab;
@@ -155,7 +154,21 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
     assert_eq!(watched, "motor.0 is On, odometry.0 is On\nnumber 0\n");
     a_picture_comes_as_the_camera_took_it(&scene, || scene.book("look.py"), "picture.png");
     let closes = || scene.says(&["call", "gripper.0", "close", "4"]);
-    assert_eq!(closes().ok(), "{width_m: 0.02, force_n: 4}\n");
+    let wait_closed = |when: &str| {
+        let closed = wait(when, || Some(closes()).filter(|said| said.code == Some(0)));
+        assert_eq!(closed.ok(), "{width_m: 0.02, force_n: 4}\n", "{when}");
+    };
+    wait_closed("the robot stops, and it closes");
+    // What it calls does not answer in time: that is no error of its own, and passes.
+    let motor = scene.robot.pid("motor.0");
+    halt(motor);
+    let late = closes();
+    assert!(
+        late.code == Some(1) && late.out.contains("answers with an error: \"the robot does not stop: no answer from "),
+        "{late:?}"
+    );
+    signal(motor, Signal::SIGCONT);
+    wait_closed("the robot stops again, and it closes");
     let refused = scene.says(&["call", "gripper.0", "close", "40"]);
     assert_eq!(
         (refused.code, refused.out.trim()),
@@ -182,7 +195,7 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
     assert!(code.contains("fn close(&mut self, force_n: f64) -> Result<Grip, String>;"), "{code}");
     // The TCP router is killed; the program in Python comes back by itself, the same one.
     signal(scene.robot.pid("tcp.255"), Signal::SIGKILL);
-    wait("it is called again", || closes().out.contains("width_m").then_some(()));
+    wait_closed("it is called again");
     gripper.assert_runs();
     gripper.signal(Signal::SIGINT);
     gripper.end();
@@ -273,7 +286,8 @@ fn a_client_in_python_conforms_at_a_tcp_router() {
 
 #[test]
 fn rust_conforms_at_a_tcp_router_too() {
-    let module = format!("[[module]]\nname = \"probe.0\"\nnode = \"base\"\nprogram = {}\n", conforming::program());
+    let module =
+        format!("[[module]]\nname = \"probe.0\"\nnode = \"base\"\nprogram = {}\n", program("conforming::module"));
     let Some(scene) = Scene::with(OPEN, &module) else { return };
     let (run, me) = (repository().join("tests/conformance/run.py"), std::env::current_exe().unwrap());
     let client = [me.to_str().unwrap(), "--exact", "conforming::client", "--nocapture"];

@@ -2,7 +2,7 @@
 //! Python read in place. Those that are not killed go on, pictures are whole, and accounts balance as in Rust.
 
 use crate::c_modules::{CLASSES, compiled, entry, example, said, seen};
-use crate::harness::{OUTPUT, Place, Robot, signal, wait};
+use crate::harness::{OUTPUT, Place, Robot, program, signal, wait};
 use crate::python_node::{package, repository};
 use nix::sys::signal::Signal;
 use rohrpost::Name;
@@ -40,8 +40,7 @@ fn seer(place: &Place) -> PathBuf {
 
 fn modules(place: &Place) -> Vec<String> {
     let quoted = |path: &Path| format!("{path:?}");
-    let looker =
-        format!("[{:?}, \"--exact\", \"c_modules::module\", \"--nocapture\"]", std::env::current_exe().unwrap());
+    let looker = program("c_modules::module");
     let stream = "[module.stream.image]\nrecord = \"256 KiB\"\nkeep = 4\n";
     let reads = format!("calls = [\"camera.0\"]\n{RESTART}");
     vec![

@@ -1,7 +1,7 @@
 //! A log as the time of a node: ticks come at the log's pace, none before it begins nor while it stands still, and from
 //! its beginning again when it is played anew.
 
-use crate::harness::{Place, Robot, probe, wait};
+use crate::harness::{PATIENCE, Place, Robot, probe, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use rohrpost::ToolLink;
@@ -9,13 +9,11 @@ use rohrpost::common::GET_DATA;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{SystemClock, TimeSource, monotonic_ns};
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// When the log begins, s after 1970.
 const BEGIN_S: u64 = 1_000_000_000;
 /// Of the probe's ticks, in the node's time.
 const PERIOD_NS: u64 = 250_000_000;
-const PATIENCE: Duration = Duration::from_secs(20);
 
 const HEAD: &str = r#"
 installation = "test"
@@ -35,10 +33,17 @@ real-time-from = 256
 source = "log"
 "#;
 
-/// A robot with a probe and a player of a log that lasts longer than any test.
+/// Writes the log that the player plays when it is started: one that lasts longer than any test.
+fn write_log(place: &Place, begin_s: u64) {
+    let line = |s: u64| format!("ODOM 0 0 0 0 0 0 {s}.0 host 0\n");
+    std::fs::write(place.path("next.log"), (begin_s..begin_s + 50_000).map(line).collect::<String>()).unwrap();
+    // A player that runs goes on with the one that it has.
+    std::fs::rename(place.path("next.log"), place.path("long.log")).unwrap();
+}
+
+/// A robot with a probe and a player of a log.
 fn robot(place: &Place, speed: f64, player_keys: &str) -> (Running, Robot, PathBuf) {
-    let line = |s: u64| format!("ODOM 0 0 0 0 0 0 {}.0 host 0\n", BEGIN_S + s);
-    std::fs::write(place.path("long.log"), (0..50_000).map(line).collect::<String>()).unwrap();
+    write_log(place, BEGIN_S);
     let player = format!(
         "[[module]]\nname = \"player.0\"\naliases = [\"odometry.0\", \"laser.0\"]\nbuiltin = \"carmen\"\n\
          settings = {{ file = \"long.log\", speed = {speed:?} }}\n{player_keys}\n"
@@ -113,6 +118,8 @@ fn there_is_no_tick_while_the_log_stands_still_and_they_go_on_after_a_step_back(
     let after = wait("ticks go on", || beat(&robot, &mut tool).filter(|beat| beat.number >= before.number + 3));
     assert!(after.stamp_ns >= at_ns);
     let epoch = clock.record().unwrap().epoch;
+    // So far back that it does not come to the present before it is looked at.
+    write_log(&place, BEGIN_S - 50_000);
     let pid = robot.pid("player.0");
     place.say(&["restart", "player.0"]).ok();
     robot.wait_restarted("player.0", pid);

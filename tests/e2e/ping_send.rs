@@ -64,7 +64,7 @@ fn send_repeats_a_command_and_counts_what_came_of_it() {
     send.signal(Signal::SIGINT);
     send.end();
     let (told, complaints) = (send.out(), send.err());
-    assert!(complaints.lines().all(|line| line.contains("calls are under way")), "{complaints}");
+    assert!(complaints.lines().all(|line| line.contains("too many calls to probe.0 are under way")), "{complaints}");
     let nines = place.counted().iter().filter(|n| **n == 9).count();
     assert!(told.starts_with(&format!("{nines} sent, {nines} answered")), "{told}");
     for (arguments, error) in [

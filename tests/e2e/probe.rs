@@ -12,12 +12,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What the configuration says as its program.
-pub(crate) fn program() -> String {
-    let me = std::env::current_exe().unwrap();
-    format!("[{me:?}, \"--exact\", \"probe::module\", \"--nocapture\"]")
-}
-
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {

@@ -1,7 +1,7 @@
 //! The built-in module `logd` on a running node: all that was sent is in its files, or counted; they are whole, also
 //! after it was killed; and a disk that is not there is told, and disturbs nobody.
 
-use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, RECORDED_CLASSES, Robot, program, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rand_chacha::ChaCha8Rng;
@@ -35,8 +35,6 @@ pub(crate) struct Frame {
 }
 
 pub(crate) const FRAME_BYTES: usize = 10_000;
-/// The recorder answers within this time.
-const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The bytes of a frame. As those of a camera, they do not get shorter by compression.
 pub(crate) fn noise(number: u64) -> Vec<u8> {
@@ -126,10 +124,10 @@ sync = "100 ms"
 "#;
 
 pub(crate) fn feeder_entry(number: u8) -> String {
-    let program = format!("{:?}", std::env::current_exe().unwrap());
+    let program = program("recorded::feeder");
     format!(
-        "[[module]]\nname = \"feeder.{number}\"\nprogram = [{program}, \"--exact\", \"recorded::feeder\", \
-         \"--nocapture\"]\n[module.stream.frame]\nrecord = \"16 KiB\"\nkeep = 512\n"
+        "[[module]]\nname = \"feeder.{number}\"\nprogram = {program}\n[module.stream.frame]\n\
+         record = \"16 KiB\"\nkeep = 512\n"
     )
 }
 

@@ -3,7 +3,7 @@
 //!
 //! Only what was written and what came counts, not when: a busy computer passes records over, and says so.
 
-use crate::harness::{NETWORK, OUTPUT, Place, Robot, wait};
+use crate::harness::{NETWORK, OUTPUT, Place, Robot, program, wait};
 use crate::lan::addresses;
 use crate::process::Running;
 use rohrpost::serde::Deserialize;
@@ -188,12 +188,9 @@ fn config(place: &Place) -> PathBuf {
     let nodes = format!(
         "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.brain]\naddress = \"{brain}\"\ntools = [16, 31]\n"
     );
-    let program = format!("{:?}", std::env::current_exe().unwrap());
     let module = |name: &str, stream: &str| {
-        format!(
-            "[[module]]\nname = \"{name}.0\"\nnode = \"base\"\nprogram = [{program}, \"--exact\", \
-             \"replicas_lossy::{name}\", \"--nocapture\"]\n[module.stream.{stream}]\n"
-        )
+        let program = program(&format!("replicas_lossy::{name}"));
+        format!("[[module]]\nname = \"{name}.0\"\nnode = \"base\"\nprogram = {program}\n[module.stream.{stream}]\n")
     };
     let modules = [
         OUTPUT.replacen("[[module]]\n", "[[module]]\nnode = \"base\"\n", 1),

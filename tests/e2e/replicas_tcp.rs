@@ -3,7 +3,7 @@
 //!
 //! How many come is for the line to say; what is compared is poses with pictures.
 
-use crate::harness::{Place, Robot, lab, wait};
+use crate::harness::{Place, Robot, lab, program, wait};
 use crate::process::Running;
 use crate::replicas_lossy::{Follower, Right, is_picture, is_pose};
 use rohrpost_routers::lab::Lab;
@@ -73,13 +73,10 @@ impl Laptop {
         let lab = lab(NODES, "replicas on a laptop")?;
         let place = Place::new();
         let config = place.path("robot.toml");
-        let program = format!("{:?}", std::env::current_exe().unwrap());
         let module = |(name, node, stream): (&str, &str, &str)| {
             let class = name.split('.').next().unwrap();
-            format!(
-                "[[module]]\nname = \"{name}\"\nnode = \"{node}\"\nprogram = [{program}, \"--exact\", \
-                 \"replicas_lossy::{class}\", \"--nocapture\"]\n[module.stream.{stream}]\n"
-            )
+            let program = program(&format!("replicas_lossy::{class}"));
+            format!("[[module]]\nname = \"{name}\"\nnode = \"{node}\"\nprogram = {program}\n[module.stream.{stream}]\n")
         };
         let modules = [
             module(("camera.0", "base", "picture")) + "record = \"5 MiB\"\nkeep = 4\nreaders = 2\n",

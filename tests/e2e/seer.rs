@@ -2,6 +2,7 @@
 //!
 //! It is this test program itself, as `probe` is.
 
+use crate::harness::program;
 use rohrpost::schema::Bytes;
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Interest, Module, ModuleClock, ModuleError, Ready, Received, Stream, StreamSubscription};
@@ -25,11 +26,11 @@ pub(crate) const NOTHING: &[u8] = b"nothing";
 
 /// Its lines in a configuration.
 pub(crate) fn entry(number: usize, source: &str) -> String {
-    let program = format!("{:?}", std::env::current_exe().unwrap());
+    let program = program("seer::module");
     let room = format!("[module.stream.picture]\nrecord = \"{} B\"\nkeep = 256\n", PICTURE_BYTES + 8);
     let room = if source == "pictures" { &*room } else { "" };
     format!(
-        "[[module]]\nname = \"seer.{number}\"\nprogram = [{program}, \"--exact\", \"seer::module\", \"--nocapture\"]\n\
+        "[[module]]\nname = \"seer.{number}\"\nprogram = {program}\n\
          settings = {{ source = \"{source}\" }}\nstop-within = \"60 s\"\n{room}"
     )
 }

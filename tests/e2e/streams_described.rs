@@ -2,7 +2,7 @@
 //! at a time.
 
 use crate::completions::offered;
-use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, program, wait};
 use crate::process::{Running, Said};
 use rohrpost::interfaces::WheelsInterface;
 use rohrpost::serde::Deserialize;
@@ -83,14 +83,14 @@ settings = { laser = "laser.0", motor = "motor.0", cruise-m-s = 0.6, seed = 16 }
 
 [[module]]
 name = "reader.0"
-program = [PROGRAM, "--exact", "streams_described::reader", "--nocapture"]
+program = PROGRAM
 "#;
 
 const ODOMETRY: [&str; 2] = ["odometry.0", "odometry"];
 
 fn launched(place: &Place) -> (Running, Robot) {
     let map = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
-    let program = format!("{:?}", std::env::current_exe().unwrap());
+    let program = program("streams_described::reader");
     let text = ROBOT.replace("MAP", map).replace("PROGRAM", &program);
     place.launched(&[RECORDED_CLASSES, &text, OUTPUT])
 }

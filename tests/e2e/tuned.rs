@@ -1,6 +1,7 @@
 //! A module with parameters of every kind, for tests of `rohrpost param`. Like the probe it is this test program
 //! itself.
 
+use crate::harness::program;
 use crate::process::Said;
 use rohrpost::parameter::ParameterSet;
 use rohrpost::{Context, Module, ModuleError};
@@ -8,8 +9,7 @@ use std::time::Duration;
 
 /// A table's line in a configuration: such a module with these settings and other keys.
 pub(crate) fn tuned(name: &str, settings: &str, keys: &str) -> String {
-    let me = std::env::current_exe().unwrap();
-    let program = format!("[{me:?}, \"--exact\", \"tuned::module\", \"--nocapture\"]");
+    let program = program("tuned::module");
     format!("[[module]]\nname = \"{name}\"\nprogram = {program}\nsettings = {{ {settings} }}\n{keys}\n")
 }
 

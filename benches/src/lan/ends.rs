@@ -1,9 +1,9 @@
 //! Two modules on two nodes, by the public interface of mailboxes alone.
 
-use super::flow::{Inlet, Outlet, SILENCE};
+use super::flow::{Inlet, LOOK, Outlet};
 use super::nodes::{self, Nodes};
 use crate::Failure;
-use crate::harness::{End, Link, Meetings};
+use crate::harness::{Child, End, Link, Meetings};
 use rohrpost_mailbox::{
     Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 
 /// Slots of a mailbox that must hold a whole window at once.
 const SLOTS: u16 = 256;
+/// Routers speak to each other five times a second.
+const COMES_WITHIN: Duration = Duration::from_secs(60);
+const SEND_EACH: Duration = Duration::from_millis(5);
 
 /// One end of a ping-pong.
 pub struct Module {
@@ -70,6 +73,25 @@ impl Link for Module {
         let package = package.ok_or_else(|| Failure::Failed("a package is lost".into()))?;
         copy(package.body(), message)
     }
+}
+
+/// Sends packages from the node in the first directory to that in the second one until one has come. What comes to a
+/// router before it knows the incarnation of the sending router is lost.
+///
+/// # Errors
+/// When none comes.
+pub fn await_way([from, to]: [&Path; 2], [own, other]: [Name; 2]) -> Result<(), Failure> {
+    let sends = Child::start(|| {
+        let message = [0; 16];
+        let mut sink = LanSink::open(to, other, message.len())?;
+        let mut source = LanSource::open(from, own, other)?;
+        while sink.drain() == 0 {
+            source.offer(&message)?;
+            std::thread::sleep(SEND_EACH);
+        }
+        Ok(())
+    })?;
+    sends.finish(Instant::now() + COMES_WITHIN).map_err(|failure| Failure::of("no package comes", failure))
 }
 
 /// The sending side of a stream of packages.
@@ -148,7 +170,7 @@ impl Outlet for LanSink {
         // With a package there it reads no clock.
         let waiting = match self.receiver.try_receive() {
             Some(package) => return copy(package.body(), message).map(|()| true),
-            None => Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + SILENCE) },
+            None => Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + LOOK) },
         };
         match self.receiver.receive_timeout(waiting) {
             Some(package) => copy(package.body(), message).map(|()| true),

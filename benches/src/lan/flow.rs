@@ -18,7 +18,7 @@ pub trait Inlet {
 
 /// The receiving side.
 pub trait Outlet {
-    /// Receives the next message, of exactly this length; false when none came within [`SILENCE`].
+    /// Receives the next message, of exactly this length; false when none came within [`LOOK`].
     ///
     /// # Errors
     /// When it cannot be received, or has another length.
@@ -33,10 +33,16 @@ pub const FILLER: u8 = 0x5a;
 const LOOK_EVERY: u64 = 61;
 /// The sender looks at the clock after so many messages.
 const CLOCK_EVERY: u64 = 16;
-/// After this silence nothing more is in flight.
-pub const SILENCE: Duration = Duration::from_millis(250);
-/// A turn that exceeds its cap by so much hangs, and is killed.
-const GRACE: Duration = Duration::from_secs(30);
+/// So often a receiver looks whether all was sent, while nothing comes.
+pub const LOOK: Duration = Duration::from_millis(50);
+/// After this silence nothing more is in flight, of what waits in programs: a large record takes a second on a slow
+/// computer, and routers wait as long for lost parts.
+pub const SILENCE: Duration = Duration::from_secs(10);
+/// The same of what waits in the kernel alone.
+pub const KERNEL_SILENCE: Duration = Duration::from_millis(250);
+/// A turn that exceeds its cap by so much hangs, and is killed: silent when its window is full, and at its end.
+const GRACE: Duration = Duration::from_secs(60);
+const _: () = assert!(GRACE.as_secs() > 3 * SILENCE.as_secs(), "a turn with losses must end by itself");
 
 /// One turn of one contender.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +59,8 @@ pub struct Flow {
     pub sender_fifo: u8,
     /// Ends the sending.
     pub cap: Duration,
+    /// When nothing came for so long, all that is on its way is lost.
+    pub silence: Duration,
 }
 
 /// The result.
@@ -212,17 +220,23 @@ fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &FlowTurn) -> Result
     let mut message = vec![0; flow.bytes];
     let (mut next, mut received) = (0, 0);
     let (mut first_ns, mut last_ns) = (0, 0);
+    let mut silent_since_ns = monotonic_ns();
     loop {
         // Loaded before: all sent messages are in flight when this is stored.
-        let is_over = turn.sent.load(Ordering::Acquire) != 0;
+        let sent = turn.sent.load(Ordering::Acquire);
         if !outlet.receive(&mut message)? {
-            if is_over {
+            let is_silent = u128::from(monotonic_ns() - silent_since_ns) >= flow.silence.as_nanos();
+            if sent != 0 && (next == sent || is_silent) {
                 break;
             }
-            turn.credit.silent();
+            if is_silent {
+                turn.credit.silent();
+                silent_since_ns = monotonic_ns();
+            }
             continue;
         }
         last_ns = monotonic_ns();
+        silent_since_ns = last_ns;
         if received == 0 {
             first_ns = last_ns;
         }
@@ -302,8 +316,15 @@ mod tests {
 
     /// How many came of these, when 10 were sent.
     fn received(messages: impl IntoIterator<Item = Vec<u8>>) -> Result<u64, Failure> {
-        let flow =
-            Flow { bytes: 32, messages: 10, window: None, sender: End::Ping, sender_fifo: 50, cap: Duration::ZERO };
+        let flow = Flow {
+            bytes: 32,
+            messages: 10,
+            window: None,
+            sender: End::Ping,
+            sender_fifo: 50,
+            cap: Duration::ZERO,
+            silence: Duration::ZERO,
+        };
         let turn = Shared::<FlowTurn>::new()?;
         turn.sent.store(10, Ordering::Release);
         receive_all(&mut Canned(messages.into_iter().collect()), &flow, &turn)?;

@@ -1,5 +1,6 @@
 //! Two nodes with real routers between them, as launch would start them.
 
+use super::ends::await_way;
 use super::records::{self, RECORDS};
 use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all};
 use super::wire::{Wire, address, name_of};
@@ -14,6 +15,8 @@ const INSTALLATION: &str = "bench-lan";
 /// Class of the modules that are timed, and of those that flood.
 const BENCH: Class = Class(200);
 const FLOOD: Class = Class(100);
+/// The turn before the first one.
+const INTRODUCING: u8 = u8::MAX;
 
 /// What differs between cases.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +43,7 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// Starts both routers and waits until they take packages.
+    /// Starts both routers and waits until they take packages of each other.
     ///
     /// # Errors
     /// What a router failed with; [`Failure::Skipped`] when the command is not there.
@@ -64,9 +67,11 @@ impl Nodes {
             nodes.routers.push(router);
         }
         nodes.routers.iter_mut().try_for_each(Router::await_ready)?;
-        if let Some(shape) = network.records {
-            for (from, to) in [(End::Ping, End::Pong), (End::Pong, End::Ping)] {
-                records::begin(&nodes.directory(from), &nodes.directory(to), index(from), shape)?;
+        for (from, to) in [(End::Ping, End::Pong), (End::Pong, End::Ping)] {
+            let (from_directory, to_directory) = (nodes.directory(from), nodes.directory(to));
+            await_way([&from_directory, &to_directory], [flood(from, INTRODUCING), flood(to, INTRODUCING)])?;
+            if let Some(shape) = network.records {
+                records::begin(&from_directory, &to_directory, index(from), shape)?;
             }
         }
         Ok(nodes)

@@ -5,7 +5,7 @@
 //! ```
 //! A record is written whole and read in place. Which records come is the routers' matter; what reads them counts.
 
-use super::flow::{Inlet, Outlet, look_at};
+use super::flow::{Inlet, LOOK, Outlet, SILENCE, look_at};
 use super::router::SYSTEM;
 use crate::harness::{Child, Failure, Link};
 use crate::streams::{came, stamp, stream_failure};
@@ -23,12 +23,11 @@ pub const RECORDS: Class = Class(150);
 const ITEM: &str = "record";
 const NUMBER: u16 = 1;
 /// Routers look for new streams twice a second, and send descriptions once.
-const BEGINS_WITHIN: Duration = Duration::from_secs(20);
+const BEGINS_WITHIN: Duration = Duration::from_secs(60);
 const WRITE_EACH: Duration = Duration::from_millis(5);
-/// After this silence nothing more comes: on a busy computer a record of some thousand datagrams takes a while.
-const SILENCE: Duration = Duration::from_secs(1);
-/// Routers wait as long for lost parts.
-const DEADLINE: &str = "1 s";
+/// Routers wait for so long for lost parts, seconds.
+const DEADLINE_S: u64 = 5;
+const _: () = assert!(DEADLINE_S < SILENCE.as_secs(), "a record that comes late is not lost");
 
 fn stream(instance: u8) -> StreamId {
     StreamId { name: Name::new(SYSTEM, RECORDS.0, instance, 0), number: NUMBER }
@@ -41,7 +40,7 @@ pub fn entries(instance: u8, node: &str, to: &[&str], shape: StreamShape) -> Str
     format!(
         "[[module]]\nname = \"records.{instance}\"\nnode = \"{node}\"\nprogram = \"records\"\noptional = true\n\
          [module.stream.{ITEM}]\nrecord = \"{record_bytes} B\"\nkeep = {keep}\nreaders = {readers}\n\
-         [[replica]]\nstream = \"records.{instance}/{ITEM}\"\nto = {to:?}\ndeadline = \"{DEADLINE}\"\n"
+         [[replica]]\nstream = \"records.{instance}/{ITEM}\"\nto = {to:?}\ndeadline = \"{DEADLINE_S} s\"\n"
     )
 }
 
@@ -128,14 +127,14 @@ impl RecordOutlet {
 
 impl Outlet for RecordOutlet {
     fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
-        let mut waiting = Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + SILENCE) };
+        let waiting = Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + LOOK) };
         loop {
             match self.reader.next_timeout(waiting).map_err(stream_failure)? {
                 Next::Record(record) if !record.body().is_empty() => {
                     return look_at(record.body(), message).map(|()| true);
                 }
                 // One of those with which it began, or some are lost: the numbers of those that come say so.
-                Next::Record(_) | Next::Lost(_) => waiting.deadline = Some(Instant::now() + SILENCE),
+                Next::Record(_) | Next::Lost(_) => {}
                 Next::Nothing => return Ok(false),
             }
         }

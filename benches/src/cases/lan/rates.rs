@@ -16,7 +16,7 @@ use super::ground::{LanSegment, WHOLE};
 use crate::cases::Case;
 use crate::harness::{End, Failure};
 use crate::lan::ends::{LanSink, LanSource};
-use crate::lan::flow::{Flow, Flown, SILENCE, flow};
+use crate::lan::flow::{Flow, Flown, KERNEL_SILENCE, LOOK, SILENCE, flow};
 use crate::lan::nodes::{self, Network, UNPACED};
 use crate::lan::udp::Datagrams;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
@@ -76,8 +76,9 @@ impl Case for Rate {
             sender: End::Ping,
             sender_fifo: 50,
             cap: TURN,
+            silence: KERNEL_SILENCE,
         };
-        let beside = Flow { window: Some(WINDOW), ..raw };
+        let beside = Flow { window: Some(WINDOW), silence: SILENCE, ..raw };
         let apart = Flow { sender: End::Pong, sender_fifo: SENDER_FIFO, ..beside };
         let ours = |ours: &Flow| {
             let (nodes, turn) = ground.turn()?;
@@ -93,7 +94,7 @@ impl Case for Rate {
             losses.rated(BESIDE_ROUTER, || ours(&beside)),
             losses.rated("udp", || {
                 let open = |end| Datagrams::open(ground.wire()?, end);
-                flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(SILENCE))
+                flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(LOOK))
             }),
         ];
         contenders.extend(cbware(self.bytes));

@@ -29,7 +29,7 @@ use crate::harness::{
 };
 use crate::lan::Wire;
 use crate::lan::ends::{LanSink, LanSource, Module};
-use crate::lan::flow::{Inlet, Outlet};
+use crate::lan::flow::{Inlet, LOOK, Outlet};
 use crate::lan::nodes::{self, Network, Nodes};
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::udp::Datagrams;
@@ -51,9 +51,9 @@ const MESSAGES: usize = 1_000;
 const WARM_UP: usize = 50;
 const PACE: Duration = Duration::from_millis(1);
 const CAP: Duration = Duration::from_secs(3);
-/// Timeout of an urgent package; a later one counts as lost.
-const LOST_AFTER: Duration = Duration::from_secs(1);
-const ENDS_WITHIN: Duration = Duration::from_secs(5);
+/// Timeout of an urgent package; a later one counts as lost. No router delivers one that is so old.
+const LOST_AFTER: Duration = Duration::from_secs(5);
+const ENDS_WITHIN: Duration = Duration::from_secs(20);
 const CARRIED: Network = Network { mtu: 1_500, rate: "10 MiB", quota: "256 KiB", sealed: false, records: None };
 /// The default of users.
 const USUAL: Network = Network { rate: "100 MiB", ..CARRIED };
@@ -63,8 +63,6 @@ const RECORDS: StreamShape =
     StreamShape { record_bytes: RECORD_BYTES as u32, keep: 8, readers: 4, late: Duration::ZERO };
 /// Port of the bare flood.
 const FLOOD_PORT: u16 = 20_217;
-/// The bare swamp checks this often whether the turn is over.
-const LOOK: Duration = Duration::from_millis(100);
 /// Headers of a datagram on an Ethernet, with its gap.
 const WIRE_BYTES: u64 = 66;
 

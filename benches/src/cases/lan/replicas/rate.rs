@@ -12,7 +12,7 @@ use crate::cases::Case;
 use crate::cases::lan::ground::{LanSegment, replicating};
 use crate::cases::lan::rates::{Losses, SENDER_FIFO, TURN, cbware};
 use crate::harness::{End, Failure};
-use crate::lan::flow::{Flow, SILENCE, flow};
+use crate::lan::flow::{Flow, KERNEL_SILENCE, LOOK, SILENCE, flow};
 use crate::lan::nodes::index;
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::udp::{Datagrams, RawParts};
@@ -64,6 +64,7 @@ impl Case for ReplicaRate {
             sender: End::Pong,
             sender_fifo: SENDER_FIFO,
             cap: TURN,
+            silence: SILENCE,
         };
         let raw = Flow {
             bytes: self.bytes.div_ceil(parts) + HEADS_BYTES,
@@ -71,6 +72,7 @@ impl Case for ReplicaRate {
             window: None,
             sender: End::Ping,
             sender_fifo: 50,
+            silence: KERNEL_SILENCE,
             ..ours
         };
         let losses = Losses::default();
@@ -88,7 +90,7 @@ impl Case for ReplicaRate {
                 flow(
                     &raw,
                     || Ok(RawParts::new(open(End::Ping)?, self.bytes)),
-                    || Ok(RawParts::new(open(End::Pong)?.with_patience(SILENCE)?, self.bytes)),
+                    || Ok(RawParts::new(open(End::Pong)?.with_patience(LOOK)?, self.bytes)),
                 )
             }),
         ];

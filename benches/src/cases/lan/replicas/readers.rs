@@ -3,7 +3,7 @@
 use crate::cases::Case;
 use crate::cases::lan::ground::{LanSegment, replicating};
 use crate::harness::{Child, End, Failure, Gate, Shared, Zeroable};
-use crate::lan::flow::{FILLER, Inlet, Outlet, checked, put_number};
+use crate::lan::flow::{FILLER, Inlet, Outlet, SILENCE, checked, put_number};
 use crate::lan::nodes::index;
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::sent::Sent;
@@ -22,7 +22,10 @@ const RECORDS: usize = 200;
 const SHAPE: StreamShape = StreamShape { record_bytes: BYTES as u32, keep: 64, readers: 32, late: Duration::ZERO };
 /// From one record to the next: a wire that keeps pace.
 const EACH: Duration = Duration::from_millis(2);
-const ENDS_WITHIN: Duration = Duration::from_secs(30);
+/// Records in flight, at most: behind by half of the ring, a replica goes on with the newest.
+const WINDOW: u64 = 16;
+const _: () = assert!(2 * WINDOW <= SHAPE.keep as u64, "the window must fit into half of the ring");
+const ENDS_WITHIN: Duration = Duration::from_secs(60);
 /// Ours, and what is compared with it.
 const ALL: &str = "rohrpost";
 const ONE: &str = "one reader";
@@ -74,6 +77,8 @@ struct Watched {
     gate: Gate,
     bytes: AtomicU64,
     packets: AtomicU64,
+    /// Records that each reader has read.
+    read: [AtomicU64; READERS as usize],
 }
 
 // SAFETY: atomics only.
@@ -83,16 +88,24 @@ unsafe impl Zeroable for Watched {}
 fn watch(ground: &LanSegment, readers: u32, records: u64) -> Result<Sent, Failure> {
     let ((nodes, _), wire, watched) = (ground.turn()?, ground.wire()?, Shared::<Watched>::new()?);
     let (origin, all) = (index(End::Ping), readers + 1);
+    let of = |count: &AtomicU64| count.load(Ordering::Acquire);
     // All meet before the first record and behind the last one.
-    let reader = || {
+    let reader = |reader: u32| {
         let mut outlet = RecordOutlet::open(&nodes.directory(End::Pong), origin)?;
         watched.gate.meet(all)?;
         let mut record = vec![0; BYTES];
         for due in 0..records {
-            let came = if outlet.receive(&mut record)? { Some(checked(&record)?) } else { None };
-            if came != Some(due) {
-                return Err(Failure::Failed(format!("record {due} was due, and {came:?} came")));
+            let since = Instant::now();
+            while !outlet.receive(&mut record)? {
+                if since.elapsed() > SILENCE {
+                    return Err(Failure::Failed(format!("record {due} was due, and none came for {SILENCE:?}")));
+                }
             }
+            let came = checked(&record)?;
+            if came != due {
+                return Err(Failure::Failed(format!("record {due} was due, and {came} came")));
+            }
+            watched.read[reader as usize].store(due + 1, Ordering::Release);
         }
         watched.gate.meet(2 * all)
     };
@@ -101,7 +114,11 @@ fn watch(ground: &LanSegment, readers: u32, records: u64) -> Result<Sent, Failur
         let mut inlet = RecordInlet::open(&nodes.directory(End::Ping), origin, SHAPE)?;
         watched.gate.meet(all)?;
         let (before, mut record) = (Sent::now()?, vec![FILLER; BYTES]);
+        let slowest = || watched.read[..readers as usize].iter().map(of).min().unwrap_or(0);
         for number in 0..records {
+            while number >= slowest() + WINDOW {
+                std::thread::sleep(EACH);
+            }
             put_number(&mut record, number);
             inlet.send(&record)?;
             std::thread::sleep(EACH);
@@ -112,10 +129,10 @@ fn watch(ground: &LanSegment, readers: u32, records: u64) -> Result<Sent, Failur
         watched.packets.store(sent.packets, Ordering::Release);
         Ok(())
     };
-    let mut children = (0..readers).map(|_| Child::start(reader)).collect::<Result<Vec<_>, Failure>>()?;
+    let mut children =
+        (0..readers).map(|number| Child::start(|| reader(number))).collect::<Result<Vec<_>, Failure>>()?;
     children.push(Child::start(writer)?);
     let deadline = Instant::now() + ENDS_WITHIN;
     children.into_iter().try_for_each(|child| child.finish(deadline))?;
-    let of = |count: &AtomicU64| count.load(Ordering::Acquire);
     Ok(Sent { bytes: of(&watched.bytes), packets: of(&watched.packets) })
 }
