@@ -124,7 +124,9 @@ pub enum ControlError {
     #[error("{0} is left out and never ran, since its program is missing; `rohrpost start {0}` looks for it again")]
     LeftOut(String),
     /// It is to be started, was left out, and its program is still missing.
-    #[error("{module} stays left out: for launch `{program}` {place}; build or install it, then `rohrpost start {module}`")]
+    #[error(
+        "{module} stays left out: for launch `{program}` {place}; build or install it, then `rohrpost start {module}`"
+    )]
     NoProgram {
         /// The module.
         module: String,
