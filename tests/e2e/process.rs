@@ -1,8 +1,8 @@
 //! A process of a test, and its output.
 
-use crate::harness::{PATIENCE, signal};
+use crate::harness::PATIENCE;
 use nix::sys::resource::{Resource, setrlimit};
-use nix::sys::signal::Signal;
+use nix::sys::signal::{SigHandler, Signal, signal};
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus};
@@ -71,6 +71,14 @@ impl Printed {
     }
 }
 
+/// A shell that runs tests in the background has them ignore Ctrl-C, and their children, too. Python would go on then.
+fn heeding_control_c(command: &mut Command) {
+    // SAFETY: between fork and exec it makes a system call, and no handler is replaced that anybody waits for.
+    let heed = || unsafe { signal(Signal::SIGINT, SigHandler::SigDfl) }.map(drop).map_err(Into::into);
+    // SAFETY: as above.
+    unsafe { command.pre_exec(heed) };
+}
+
 /// Takes the right to real-time scheduling from a command, even if root runs the tests.
 pub(crate) fn without_real_time(command: &mut Command) {
     const CAP_SYS_NICE: nix::libc::c_ulong = 23;
@@ -87,6 +95,7 @@ pub(crate) fn without_real_time(command: &mut Command) {
 
 impl Running {
     pub(crate) fn start(mut command: Command) -> Self {
+        heeding_control_c(&mut command);
         let mut child = command.spawn().unwrap();
         let (out, err) = (Printed::read(child.stdout.take()), Printed::read(child.stderr.take()));
         Self { child, out, err }
@@ -135,7 +144,7 @@ impl Running {
     }
 
     pub(crate) fn signal(&self, number: Signal) {
-        signal(self.pid(), number);
+        crate::harness::signal(self.pid(), number);
     }
 
     /// Waits for its end, and for all it has printed.
