@@ -84,6 +84,8 @@ impl Fuzzer {
         let mut command = cargo(&["build", "--package", PACKAGE, "--features", "libfuzzer"]);
         // Flags for a named target do not reach build scripts and macros.
         let host = host()?;
+        // Here inputs a second count for more than the time to compile.
+        command.args(["--config", "profile.dev.opt-level=1"]);
         for dependency in OPTIMISED {
             command.args(["--config", &format!("profile.dev.package.{dependency}.opt-level=2")]);
         }
