@@ -1,9 +1,8 @@
 //! Two modules on two nodes, by the public interface of mailboxes alone.
 
 use super::flow::{Inlet, LOOK, Outlet};
-use super::nodes::{self, Nodes};
 use crate::Failure;
-use crate::harness::{Child, End, Link, Meetings};
+use crate::harness::{Child, Link, Meetings};
 use rohrpost_mailbox::{
     Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
@@ -27,19 +26,11 @@ pub struct Module {
 }
 
 impl Module {
-    /// Opens an end, in the process that will use it.
+    /// Opens an end on the node with this directory, in the process that will use it; the names are its own and the
+    /// other's.
     ///
     /// # Errors
     /// When the mailboxes cannot be made, or there is no route to the other node.
-    pub fn open(nodes: &Nodes, end: End, turn: u8, bytes: usize, meetings: &mut Meetings) -> Result<Self, Failure> {
-        let other = nodes::bench(if end == End::Ping { End::Pong } else { End::Ping }, turn);
-        Self::between(&nodes.directory(end), [nodes::bench(end, turn), other], bytes, meetings)
-    }
-
-    /// An end on the node with this directory; the names are its own and the other's.
-    ///
-    /// # Errors
-    /// As [`Self::open`].
     pub fn between(
         directory: &Path,
         [own, other]: [Name; 2],

@@ -1,11 +1,11 @@
 //! Two nodes with real routers between them, as launch would start them.
 
-use super::ends::await_way;
+use super::ends::{Module, await_way};
 use super::records::{self, RECORDS};
 use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all};
 use super::wire::{Wire, address, name_of};
 use crate::Failure;
-use crate::harness::{End, Placement, Scheduling, Scratch, settle};
+use crate::harness::{End, Meetings, Placement, Scheduling, Scratch, settle};
 use rohrpost_mailbox::{Class, Name, StreamShape};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -75,6 +75,15 @@ impl Nodes {
             }
         }
         Ok(nodes)
+    }
+
+    /// Opens an end of a ping-pong, in the process that will use it.
+    ///
+    /// # Errors
+    /// As [`Module::between`].
+    pub fn module(&self, end: End, turn: u8, bytes: usize, meetings: &mut Meetings) -> Result<Module, Failure> {
+        let other = bench(if end == End::Ping { End::Pong } else { End::Ping }, turn);
+        Module::between(&self.directory(end), [bench(end, turn), other], bytes, meetings)
     }
 
     /// The directory of an end's node.

@@ -5,7 +5,6 @@ use super::ground::{ETHERNET, LanSegment, WHOLE};
 use crate::cases::Case;
 use crate::harness::{Cell, Failure, Pause, time_two_processes};
 use crate::lan::chain::{time_chain, time_mailbox_chain};
-use crate::lan::ends::Module;
 use crate::lan::nodes::{Network, UNPACED};
 use crate::lan::udp::Datagrams;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
@@ -50,7 +49,7 @@ impl Case for LanHop {
         let contenders = [
             Contender::sampled("rohrpost", || {
                 let (nodes, turn) = ground.turn()?;
-                time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, self.bytes, meetings))
+                time_two_processes(&cell, |end, meetings| nodes.module(end, turn, self.bytes, meetings))
             }),
             Contender::sampled("chain", || time_chain(ground.wire()?, &cell)),
             Contender::sampled("chain of mailboxes", || time_mailbox_chain(ground.wire()?, &cell)),

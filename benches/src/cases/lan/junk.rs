@@ -14,7 +14,6 @@ use super::ground::{ETHERNET, LanSegment};
 use crate::cases::Case;
 use crate::harness::{Cell, End, Failure, Pause, time_two_processes};
 use crate::lan::Wire;
-use crate::lan::ends::Module;
 use crate::lan::junk::Junk;
 use crate::lan::nodes::{Network, UNPACED};
 use crate::lan::udp::Datagrams;
@@ -75,7 +74,7 @@ impl Case for LanJunk {
         };
         let ours = || {
             let (nodes, turn) = ground.turn()?;
-            time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, BYTES, meetings))
+            time_two_processes(&cell, |end, meetings| nodes.module(end, turn, BYTES, meetings))
         };
         let udp = || time_two_processes(&cell, |end, _| Datagrams::open(ground.wire()?, end));
         let contenders = [

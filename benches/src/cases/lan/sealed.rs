@@ -3,7 +3,6 @@
 use super::ground::{ETHERNET, LanSegment};
 use crate::cases::Case;
 use crate::harness::{Cell, Failure, time_two_processes};
-use crate::lan::ends::Module;
 use crate::lan::nodes::{Network, UNPACED};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
@@ -28,7 +27,7 @@ impl Case for Sealed {
         let cell = Cell::hop(self.bytes, settings.count(Cell::HOP_MESSAGES));
         let time = |ground: &LanSegment| {
             let (nodes, turn) = ground.turn()?;
-            time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, self.bytes, meetings))
+            time_two_processes(&cell, |end, meetings| nodes.module(end, turn, self.bytes, meetings))
         };
         let contenders =
             [Contender::sampled("rohrpost", || time(&sealed)), Contender::sampled("not sealed", || time(&open))];

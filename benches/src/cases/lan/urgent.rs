@@ -28,7 +28,7 @@ use crate::harness::{
     Cell, Child, End, Failure, Gate, Pause, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
 };
 use crate::lan::Wire;
-use crate::lan::ends::{LanSink, LanSource, Module};
+use crate::lan::ends::{LanSink, LanSource};
 use crate::lan::flow::{Inlet, LOOK, Outlet};
 use crate::lan::nodes::{self, Network, Nodes};
 use crate::lan::records::{RecordInlet, RecordOutlet};
@@ -149,7 +149,7 @@ impl Case for Urgent {
 /// Half of each round trip, µs. A lost package fails the turn.
 fn urgent(nodes: &Nodes, turn: u8, cell: &Cell) -> Result<Vec<f64>, Failure> {
     time_two_processes(cell, |end, meetings| {
-        let module = Module::open(nodes, end, turn, BYTES, meetings)?;
+        let module = nodes.module(end, turn, BYTES, meetings)?;
         // The far end waits for the first package while the near end still sleeps.
         Ok(if end == End::Ping { module.with_patience(LOST_AFTER) } else { module })
     })

@@ -4,7 +4,6 @@
 use crate::cases::Case;
 use crate::cases::lan::ground::{LanSegment, replicating};
 use crate::harness::{Cell, End, Failure, Scheduling, time_two_processes};
-use crate::lan::ends::Module;
 use crate::lan::nodes::index;
 use crate::lan::records::RecordLink;
 use crate::lan::udp::Datagrams;
@@ -53,7 +52,7 @@ impl Case for ReplicaHop {
             }),
             Contender::sampled("a package", || {
                 let (nodes, turn) = ground.turn()?;
-                time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, BYTES, meetings))
+                time_two_processes(&cell, |end, meetings| nodes.module(end, turn, BYTES, meetings))
             }),
             Contender::sampled("udp", || time_two_processes(&cell, |end, _| Datagrams::open(ground.wire()?, end))),
         ];
