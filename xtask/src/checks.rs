@@ -46,7 +46,7 @@ const LINTS: [Stage; 2] = [
         name: "build of all, by clippy",
         budget_s: 1200,
         run: || {
-            // Programs whose instructions are counted are compiled where they are, and linted there.
+            // The programs of `instructions` are compiled by that stage, and linted there.
             let all = ["test", "--workspace", "--no-run", "--no-fail-fast"];
             whole(cargo::run("building all, by clippy", &mut cargo(&all)))
         },
