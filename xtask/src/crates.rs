@@ -61,7 +61,8 @@ impl fmt::Display for Crates {
 
 /// Crates that a package needs, itself included; 0 if Cargo does not say, which the build then explains.
 pub(crate) fn needed(package: &str) -> usize {
-    let words = ["tree", "--package", package, "--edges", "normal,build", "--prefix", "none", "--no-dedupe"];
+    // What stands below a crate is listed once; listed each time, Rerun's tree would have no end in practice.
+    let words = ["tree", "--package", package, "--edges", "normal,build", "--prefix", "none"];
     let output = cargo::cargo(&words).stderr(Stdio::null()).output().map(|output| output.stdout).unwrap_or_default();
     count(&String::from_utf8_lossy(&output))
 }
@@ -130,8 +131,14 @@ mod tests {
     #[test]
     fn crates_of_a_tree_count_once_for_each_version() {
         let tree =
-            "bridge v0.1.0 (/w/bridge)\nsyn v2.0.1\nserde_derive v1.0.2 (proc-macro)\nsyn v2.0.1\nsyn v1.0.9\n\n";
+            "bridge v0.1.0 (/w/bridge)\nsyn v2.0.1\nserde_derive v1.0.2 (proc-macro)\nsyn v2.0.1 (*)\nsyn v1.0.9\n\n";
         assert_eq!(count(tree), 4);
         assert_eq!(count(""), 0);
+    }
+
+    #[test]
+    fn the_crates_of_the_largest_build_are_counted() {
+        let all = needed(cargo::BRIDGE);
+        assert!((300..1_000).contains(&all), "{all}");
     }
 }
