@@ -8,12 +8,12 @@ use std::sync::OnceLock;
 /// The package with a build that compiles all of Rerun.
 pub(crate) const BRIDGE: &str = "rohrpost-gui-bridge";
 
-/// Whether Cargo is called for a whole check, by [`check_what_is_compiled`].
+/// Whether this is a whole check: see [`check_what_is_compiled`].
 static CHECKED: OnceLock<()> = OnceLock::new();
 
-/// From now on, clippy is the compiler of the workspace's own crates, and its warnings are errors. So what is linted is
-/// what the tests use; a `cargo clippy` beside it would compile all once more, since it shares nothing with a build.
-/// And nothing is kept for a next compilation, which would make the first one slower.
+/// From now on clippy is the compiler of the workspace's own crates for what [`checked`] builds, and its warnings are
+/// errors. So what is linted is what the tests use; a `cargo clippy` beside it would compile all once more, since it
+/// shares nothing with a build. And nothing is kept for a next compilation, which would make the first one slower.
 pub(crate) fn check_what_is_compiled() {
     CHECKED.get_or_init(|| ());
 }
@@ -42,9 +42,18 @@ pub(crate) fn cargo(args: &[&str]) -> Command {
         command.env_remove(name);
     }
     if CHECKED.get().is_some() {
+        command.env("CARGO_INCREMENTAL", "0");
+    }
+    command
+}
+
+/// The same for what tests run, which in a whole check clippy compiles. Nothing whose speed counts: clippy leaves out
+/// optimisations, so that it sees what was written.
+pub(crate) fn checked(args: &[&str]) -> Command {
+    let mut command = cargo(args);
+    if CHECKED.get().is_some() {
         // The flags of `cargo clippy -- --deny warnings` for its driver.
         command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
-        command.env("CARGO_INCREMENTAL", "0");
     }
     command
 }

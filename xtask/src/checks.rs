@@ -6,7 +6,7 @@
 //! that run only if they are named. They find these programs by environment variables, and have to fail without them,
 //! saying `run them by "cargo xtask test --all"`.
 
-use crate::cargo::{self, BRIDGE, cargo};
+use crate::cargo::{self, BRIDGE, cargo, checked};
 use crate::failure::Failure;
 use crate::parts;
 use crate::report;
@@ -46,9 +46,11 @@ const LINTS: [Stage; 2] = [
         name: "build of all, by clippy",
         budget_s: 1200,
         run: || {
-            // The programs of `instructions` are compiled by that stage, and linted there.
             let all = ["test", "--workspace", "--no-run", "--no-fail-fast"];
-            whole(cargo::run("building all, by clippy", &mut cargo(&all)))
+            let counted = ["test", "--workspace", "--bench", "instructions", "--bench", "instructions-c", "--no-run"];
+            let built = cargo::run("building all, by clippy", &mut checked(&all));
+            let linted = cargo::run("and the programs whose instructions are counted", &mut checked(&counted));
+            whole(built.and(linted))
         },
     },
 ];
@@ -92,7 +94,7 @@ fn whole(result: Result<(), Failure>) -> Done {
 
 /// A call of Cargo that runs tests, which report to the file of this run.
 fn tests(args: &[&str]) -> Command {
-    let mut command = cargo(args);
+    let mut command = checked(args);
     command.env(rohrpost_test_report::FILE, report::path());
     command
 }
@@ -100,7 +102,7 @@ fn tests(args: &[&str]) -> Command {
 fn drawings() -> Result<(), Failure> {
     // The example is a bridge with a user's own view, which a test starts.
     let build = ["build", "--workspace", "--bin", BRIDGE, "--example", "own_view"];
-    cargo::run("building the GUI bridge", &mut cargo(&build))?;
+    cargo::run("building the GUI bridge", &mut checked(&build))?;
     let rerun = venv::venv()?.rerun;
     cargo::run(
         "testing drawings, and a viewer that misbehaves, with Rerun's command line",
