@@ -47,7 +47,7 @@ pub(crate) fn cargo(args: &[&str]) -> Command {
     command
 }
 
-/// The same for what tests run, which in a whole check clippy compiles. Nothing whose speed counts: clippy leaves out
+/// The same for what tests run, which in a whole check clippy compiles. Not for what is measured: clippy leaves out
 /// optimisations, so that it sees what was written.
 pub(crate) fn checked(args: &[&str]) -> Command {
     let mut command = cargo(args);

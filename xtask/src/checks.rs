@@ -49,7 +49,7 @@ const LINTS: [Stage; 2] = [
             let all = ["test", "--workspace", "--no-run", "--no-fail-fast"];
             let counted = ["test", "--workspace", "--bench", "instructions", "--bench", "instructions-c", "--no-run"];
             let built = cargo::run("building all, by clippy", &mut checked(&all));
-            let linted = cargo::run("and the programs whose instructions are counted", &mut checked(&counted));
+            let linted = cargo::run("and the programs of the counted paths", &mut checked(&counted));
             whole(built.and(linted))
         },
     },
