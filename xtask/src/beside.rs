@@ -73,7 +73,7 @@ fn log() -> PathBuf {
     cargo::target().join("gui-bridge-build.log")
 }
 
-/// The same as a user would type it.
+/// The file that tells of the build, as a user would type it.
 pub(crate) fn shown_log() -> PathBuf {
     let here = std::env::current_dir().unwrap_or_default();
     log().strip_prefix(here).map_or_else(|_| log(), Path::to_owned)

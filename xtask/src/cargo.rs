@@ -47,8 +47,8 @@ pub(crate) fn cargo(args: &[&str]) -> Command {
     command
 }
 
-/// The same for what tests run, which in a whole check clippy compiles. Not for what is measured: clippy leaves out
-/// optimisations, so that it sees what was written.
+/// A call of Cargo for what tests run; in a whole check clippy compiles that. [`cargo`] is for what is measured: clippy
+/// leaves out optimisations, so that it sees what was written.
 pub(crate) fn checked(args: &[&str]) -> Command {
     let mut command = cargo(args);
     if CHECKED.get().is_some() {

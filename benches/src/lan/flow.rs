@@ -38,7 +38,7 @@ pub const LOOK: Duration = Duration::from_millis(50);
 /// After this silence nothing more is in flight, of what waits in programs: a large record takes a second on a slow
 /// computer, and routers wait as long for lost parts.
 pub const SILENCE: Duration = Duration::from_secs(10);
-/// The same of what waits in the kernel alone.
+/// After this silence nothing more is in flight, of what waits in the kernel alone.
 pub const KERNEL_SILENCE: Duration = Duration::from_millis(250);
 /// A turn that exceeds its cap by so much hangs, and is killed: silent when its window is full, and at its end.
 const GRACE: Duration = Duration::from_secs(60);
