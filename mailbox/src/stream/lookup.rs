@@ -12,9 +12,10 @@
 //!                           ▲ nearest before p     ▲ nearer ▲ before 44, after 50
 //! ```
 //!
-//! An answer is final when no record that is taken from now on could change it: the newest stamp is past the later of
-//! the two by `late_ns`, or another epoch has begun. A lost record could have been nearer unless the answer is past all
-//! lost ones. So answers depend on stamps, never on arrival.
+//! An answer is final when no other stamp that is taken from now on could change it: the newest stamp is past the later
+//! of the two by `late_ns`, or another epoch has begun. A lost record could have been nearer unless the answer is past
+//! all lost ones. So answers depend on stamps, never on arrival. Of records with one stamp the newest written counts: it
+//! corrects those before it, also where one of them was answered already.
 
 use crate::stream::ring::{Line, Look, Ring, Stamp, TRIES};
 
@@ -56,7 +57,7 @@ pub(crate) fn around(ring: &Ring<'_>, at: Stamp, late_ns: u64) -> Answer {
         return lost(ring, at);
     }
     let Some((before, after)) = nearest(ring, line, end, at, late_ns) else { return lost(ring, at) };
-    // From here on no lost record could be nearer: the greatest stamp before the line is no less than any of theirs.
+    // No lost record could be nearer: the greatest stamp before the line is no less than any of theirs.
     let before = match (before, line.about.before_ns) {
         (Some(before), before_ns) if before.about.stamp.ns >= before_ns => Some(before),
         (_, 0) => None,
@@ -193,16 +194,20 @@ impl Left {
     }
 }
 
-/// The record of exactly this stamp which was the newest when it was written: mostly the one just before the first
-/// record that has passed the stamp.
+/// Of the records of exactly this stamp, which the one that has passed it found as the greatest, the newest: mostly the
+/// one just before.
 fn newest_before(ring: &Ring<'_>, low: u64, passed: &Line, stamp: Stamp) -> Option<Line> {
-    let of_stamp = |sequence: u64| match ring.look(sequence) {
-        Look::There(line) if line.about.stamp == stamp => Some(line),
-        _ => None,
-    };
-    let last = passed.sequence.checked_sub(1).filter(|last| *last >= low).and_then(of_stamp);
-    let first = || of_stamp(Left::of(stamp, low, passed).first(|sequence| reached(ring, sequence)));
-    last.filter(|line| line.about.before_ns < stamp.ns).or_else(first)
+    for sequence in (low..passed.sequence).rev() {
+        match ring.look(sequence) {
+            Look::There(line) if line.about.stamp == stamp => return Some(line),
+            Look::There(line) if line.reached() < stamp => return None,
+            // It came late.
+            Look::There(_) => {}
+            Look::Gone if ring.left_out(sequence).is_some() => {}
+            Look::Gone | Look::NotYet => return None,
+        }
+    }
+    None
 }
 
 /// From the first record that has reached the time on: the nearest that is late, if there is one, and the nearest after
@@ -212,8 +217,8 @@ fn nearest(ring: &Ring<'_>, reached: Line, end: u64, at: Stamp, late_ns: u64) ->
     let (mut before, mut after) = ((reached.about.stamp.ns == at.ns).then_some(reached), reached);
     let mut newest_ns = reached.newest_ns();
     for sequence in reached.sequence + 1..end {
-        // From here on nothing is taken that could be nearer.
-        if newest_ns >= after.about.stamp.ns.saturating_add(late_ns) {
+        // From here on nothing is taken that could be nearer, or of the same stamp.
+        if newest_ns > after.about.stamp.ns.saturating_add(late_ns) {
             break;
         }
         let line = match ring.look(sequence) {
@@ -225,10 +230,10 @@ fn nearest(ring: &Ring<'_>, reached: Line, end: u64, at: Stamp, late_ns: u64) ->
         if stamp.epoch != at.epoch {
             break;
         }
-        if stamp.ns <= at.ns && before.is_none_or(|before| stamp.ns > before.about.stamp.ns) {
+        if stamp.ns <= at.ns && before.is_none_or(|before| stamp.ns >= before.about.stamp.ns) {
             before = Some(line);
         }
-        if stamp.ns >= at.ns && stamp.ns < after.about.stamp.ns {
+        if stamp.ns >= at.ns && stamp.ns <= after.about.stamp.ns {
             after = line;
         }
         newest_ns = line.newest_ns();
@@ -319,6 +324,10 @@ mod tests {
             let lost_ns = lost.iter().filter(|stamp| stamp.epoch == asked.epoch).map(|stamp| stamp.ns).max();
             match answer {
                 Answer::Around { before, after } => {
+                    for line in [before, after] {
+                        let same = taken[..written].iter().rposition(|stamp| *stamp == line.about.stamp);
+                        assert_eq!(Some(line.sequence as usize), same, "of {asked:?}: the newest of its stamp");
+                    }
                     let told = (Some(before.about.stamp.ns), Some(after.about.stamp.ns));
                     let (before, after, _) = of(&taken);
                     assert_eq!(told, (before, after), "of {asked:?}: final, and then another");
@@ -334,16 +343,16 @@ mod tests {
     }
 
     #[test]
-    fn of_records_with_one_stamp_the_first_is_before() {
+    fn of_records_with_one_stamp_the_newest_counts() {
         let memory = Memory::default();
         let ring = memory.ring();
         let mut progress = Progress::resume(&ring);
-        for ns in [90, 100, 100, 100, 110] {
+        for ns in [90, 100, 100, 100, 110, 110] {
             let about = about(Stamp { epoch: 1, ns });
             let frame = progress.claim(&ring).unwrap();
             progress.publish(&ring, frame, about, |_| (), |_, _| ());
         }
-        for (asked, expected) in [(100, (1, 1)), (105, (1, 4)), (110, (4, 4))] {
+        for (asked, expected) in [(95, (0, 3)), (100, (3, 3)), (105, (3, 5)), (110, (5, 5))] {
             let Answer::Around { before, after } = around(&ring, Stamp { epoch: 1, ns: asked }, 0) else {
                 panic!("{asked} has records around it");
             };

@@ -44,9 +44,9 @@ pub enum NoValue {
 /// The records around a time, by their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Around {
-    /// A record has this very stamp; of several that are kept it is the first.
+    /// A record has this very stamp; of several it is the newest.
     At(u64),
-    /// The last record before and the first one after that time.
+    /// The records with the nearest stamps before and after that time; of several with one stamp the newest.
     Between {
         /// Position of the one before.
         before: u64,
@@ -99,8 +99,14 @@ pub trait Records {
         let Some(after_ns) = self.stamp_ns(after) else { return Err(forgotten(self, stamp.ns)) };
         // Until then, a record may come that stands before this one.
         settled(after_ns)?;
+        let newest_of_after = || match self.stamp_ns(after + 1) {
+            Some(next_ns) if next_ns == after_ns => {
+                first_from(self, after + 1..positions.end, after_ns.saturating_add(1)) - 1
+            }
+            _ => after,
+        };
         if after_ns == stamp.ns {
-            return Ok(Around::At(after));
+            return Ok(Around::At(newest_of_after()));
         }
         let before = after.checked_sub(1).filter(|before| positions.contains(before));
         let Some(before) = before else { return Err(NoValue::BeforeOldest { by_ns: after_ns - stamp.ns }) };
@@ -110,7 +116,7 @@ pub trait Records {
             return Err(NoValue::Gap { gap_ns, gap_max_ns });
         }
         let share = Share::between(before_ns, stamp.ns, after_ns).ok_or_else(|| forgotten(self, stamp.ns))?;
-        Ok(Around::Between { before, after, share })
+        Ok(Around::Between { before, after: newest_of_after(), share })
     }
 
     /// The value at a time: that of the record with this stamp, or interpolated between the two around it.

@@ -149,10 +149,10 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         promise: REASONS,
     },
     Mistake {
-        name: "the_last_of_a_stamp_answers",
+        name: "the_first_of_a_stamp_answers",
         file: "lookup",
-        from: "is_none_or(|ns| ns < stamp_ns)",
-        to: "is_none_or(|ns| ns < stamp_ns || broken!(the_last_of_a_stamp_answers) && ns == stamp_ns)",
+        from: "Some(next_ns) if next_ns == after_ns",
+        to: "Some(next_ns) if next_ns == after_ns && !broken!(the_first_of_a_stamp_answers)",
         promise: "lookups::without_lateness_the_newest_record_answers_at_once",
     },
     Mistake {

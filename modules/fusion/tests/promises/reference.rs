@@ -4,18 +4,23 @@
 use crate::arrival::Coming;
 use rohrpost_fusion::{NoValue, Stamp};
 
-/// The records around a time, by their numbers; one twice if it has that very stamp.
+/// The records around a time, by their numbers; one twice if it has that very stamp. Of several with one stamp the
+/// newest counts.
 pub(crate) fn around(known: &[Coming], lateness_ns: u64, asked_ns: u64, gap_max_ns: u64) -> Result<[u64; 2], NoValue> {
     let key = |record: &&Coming| (record.stamp.ns, record.sequence);
     let newest_ns = known.iter().map(|record| record.stamp.ns).max().ok_or(NoValue::Empty)?;
     // Until the newest stamp is this, a record at `ns` may come.
     let open =
         |ns: u64| (newest_ns < ns + lateness_ns).then(|| NoValue::NotYet { by_ns: ns + lateness_ns - newest_ns });
-    if let Some(exact) = known.iter().filter(|record| record.stamp.ns == asked_ns).min_by_key(key) {
+    if let Some(exact) = known.iter().filter(|record| record.stamp.ns == asked_ns).max_by_key(key) {
         return open(asked_ns).map_or(Ok([exact.sequence; 2]), Err);
     }
     let before = known.iter().filter(|record| record.stamp.ns < asked_ns).max_by_key(key);
-    let Some(after) = known.iter().filter(|record| record.stamp.ns > asked_ns).min_by_key(key) else {
+    let Some(after) = known
+        .iter()
+        .filter(|record| record.stamp.ns > asked_ns)
+        .min_by_key(|record| (record.stamp.ns, u64::MAX - record.sequence))
+    else {
         return Err(NoValue::NotYet { by_ns: asked_ns + lateness_ns - newest_ns });
     };
     if let Some(open) = open(after.stamp.ns) {
