@@ -1,6 +1,6 @@
 //! Contenders of a case, one after the other, round after round; and their rows.
 
-use crate::harness::{Failure, alone, interrupted};
+use crate::harness::{Failure, alone, interrupted, processors};
 use crate::settings::Settings;
 use crate::statistics::{Ratio, Summary, median};
 use std::time::Duration;
@@ -161,11 +161,22 @@ fn interleave(settings: &Settings, contenders: &[Contender]) -> Vec<Turns> {
             let (contender, turns) = (&contenders[at], &mut turns[at]);
             if !turns.iter().any(Result::is_err) && !interrupted() {
                 std::thread::sleep(PAUSE);
-                turns.push(alone().and_then(|_alone| (contender.turn)()));
+                let turn = alone().and_then(|_alone| (contender.turn)());
+                turns.push(turn.map_err(|failure| on(processors().len(), failure)));
             }
         }
     }
     turns
+}
+
+/// With one processor, nearly all that can fail does so since an end that needs a second one did not begin.
+fn on(processors: usize, failure: Failure) -> Failure {
+    match failure {
+        Failure::Failed(text) if processors < 2 => {
+            Failure::Skipped(format!("needs 2 processors, this program may use {processors} ({text})"))
+        }
+        failure => failure,
+    }
 }
 
 /// Ratio of one figure to another's in the same round. None for a contender that did not do every round.
@@ -194,6 +205,14 @@ fn over_rounds(turns: &[Result<Summary, Failure>]) -> Result<Summary, Failure> {
 mod tests {
     use super::*;
     use std::cell::RefCell;
+
+    #[test]
+    fn what_fails_on_one_processor_is_skipped_with_its_reason() {
+        let hung = || Failure::Failed("hung".into());
+        assert_eq!(on(2, hung()), hung());
+        let told = "needs 2 processors, this program may use 1 (hung)".to_owned();
+        assert_eq!(on(1, hung()), Failure::Skipped(told));
+    }
 
     #[test]
     fn each_round_begins_with_the_next_contender_and_one_that_failed_has_no_further_turn() {

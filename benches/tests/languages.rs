@@ -6,7 +6,7 @@
 mod support;
 
 use serde_json::{Map, Value};
-use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
+use support::{FAILED, bench, children, has_two_processors, interrupt, left_behind, rows, run, wait_for};
 
 /// Case and contender; what the last one says when it could not run here is reported by `rows`.
 const ROWS: [(&str, &str); 15] = [
@@ -29,6 +29,9 @@ const ROWS: [(&str, &str); 15] = [
 
 #[test]
 fn every_program_delivers_and_every_line_is_complete() {
+    if !has_two_processors() {
+        return;
+    }
     let (output, prefix) = run("languages", &["--quick", "--json"]);
     let rows = rows(&output);
     for (case, contender) in ROWS {
@@ -46,6 +49,9 @@ const BROKEN: &str = "#!/bin/sh\n[ \"$2\" = -c ] && exit 0\necho 'it is broken' 
 
 #[test]
 fn a_program_that_fails_is_told_with_its_own_words() {
+    if !has_two_processors() {
+        return;
+    }
     let folder = tempfile::tempdir().unwrap();
     let python = folder.path().join("python");
     std::fs::write(&python, BROKEN).unwrap();
@@ -65,6 +71,9 @@ fn a_program_that_fails_is_told_with_its_own_words() {
 
 #[test]
 fn an_interrupt_leaves_no_process() {
+    if !has_two_processors() {
+        return;
+    }
     let child = bench("languages", &["--only", "remote", "--rounds", "1000"]).spawn().unwrap();
     let mut pids = Vec::new();
     // Systems, the module, and programs in Python.

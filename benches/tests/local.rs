@@ -7,7 +7,9 @@ mod support;
 
 use nix::sys::signal::Signal;
 use std::process::Child;
-use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
+use support::{
+    are_gone, bench, children, has_two_processors, interrupt, left_behind, prefix, rows, run, signal, wait_for,
+};
 
 /// The latency cases: sizes, and the contenders besides ours.
 const CASES: [(&str, &[u64], &[&str]); 8] = [
@@ -23,6 +25,9 @@ const CASES: [(&str, &[u64], &[&str]); 8] = [
 
 #[test]
 fn every_contender_delivers_and_every_line_is_complete() {
+    if !has_two_processors() {
+        return;
+    }
     let (output, prefix) = run("local", &["--quick", "--json"]);
     let rows = rows(&output);
     for (case, sizes, others) in CASES {

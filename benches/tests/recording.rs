@@ -6,12 +6,17 @@
 mod support;
 
 use nix::sys::signal::Signal;
-use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
+use support::{
+    are_gone, bench, children, has_two_processors, interrupt, left_behind, prefix, rows, run, signal, wait_for,
+};
 
 const SIZES: [u64; 4] = [100, 1000, 62_000, 4 << 20];
 
 #[test]
 fn every_contender_records_all_and_every_line_is_complete() {
+    if !has_two_processors() {
+        return;
+    }
     let (output, prefix) = run("recording", &["--quick", "--json"]);
     let all = rows(&output);
     for case in ["recorded", "recorded, processor"] {

@@ -6,7 +6,9 @@
 mod support;
 
 use nix::sys::signal::Signal;
-use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
+use support::{
+    are_gone, bench, children, has_two_processors, interrupt, left_behind, prefix, rows, run, signal, wait_for,
+};
 
 /// Case, bytes of a record, contenders that ours is compared with, and others.
 type Rows = (&'static str, Option<u64>, &'static [&'static str], &'static [&'static str]);
@@ -28,6 +30,9 @@ const OPEN_BYTES: u64 = 512 << 20;
 
 #[test]
 fn every_contender_delivers_and_every_line_is_complete() {
+    if !has_two_processors() {
+        return;
+    }
     let (output, prefix) = run("streams", &["--quick", "--json"]);
     let all = rows(&output);
     for (case, bytes, compared, beside) in CASES {

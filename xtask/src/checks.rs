@@ -44,7 +44,7 @@ const LINTS: [Stage; 2] = [
     },
     Stage {
         name: "build of all, by clippy",
-        budget_s: 1200,
+        budget_s: 1500,
         run: || {
             let all = ["test", "--workspace", "--no-run", "--no-fail-fast"];
             let counted = ["test", "--workspace", "--bench", "instructions", "--bench", "instructions-c", "--no-run"];
@@ -76,15 +76,15 @@ const PRODUCT: [Stage; 2] = [
 const ALL: [Stage; 7] = [
     Stage {
         name: "tests",
-        budget_s: 3000,
+        budget_s: 1800,
         run: || parts::run("testing all", tests(&["test", "--workspace", "--no-fail-fast"])),
     },
-    Stage { name: "drawings, with Rerun's command line", budget_s: 600, run: || whole(drawings()) },
-    Stage { name: "recordings, with Python's reader", budget_s: 200, run: || whole(recordings()) },
-    Stage { name: "the client in Python, installed, with mypy", budget_s: 300, run: || whole(python_client()) },
-    Stage { name: "ThreadSanitizer", budget_s: 200, run: || whole(tsan::run().map(drop)) },
-    Stage { name: "instructions of the hot paths", budget_s: 500, run: || whole(instructions::check()) },
-    Stage { name: "fuzzing, short", budget_s: 500, run: || whole(fuzz::short()) },
+    Stage { name: "drawings, with Rerun's command line", budget_s: 220, run: || whole(drawings()) },
+    Stage { name: "recordings, with Python's reader", budget_s: 30, run: || whole(recordings()) },
+    Stage { name: "the client in Python, installed, with mypy", budget_s: 130, run: || whole(python_client()) },
+    Stage { name: "ThreadSanitizer", budget_s: 40, run: || whole(tsan::run().map(drop)) },
+    Stage { name: "instructions of the hot paths", budget_s: 380, run: || whole(instructions::check()) },
+    Stage { name: "fuzzing, short", budget_s: 470, run: || whole(fuzz::short()) },
 ];
 
 /// A stage without parts.
