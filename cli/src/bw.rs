@@ -4,7 +4,7 @@ use super::published::{WatchedModule, data_of};
 use super::target::Target;
 use super::units::{bytes, short};
 use super::watch::{FlowFigures, Pace};
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use rohrpost::survey::is_hop;
 use rohrpost_mailbox::{FlowInfo, Type};
 use serde_json::json;
@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// Prints one line; false when nobody reads any more.
 fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &FlowSum) -> bool {
     if !arguments.pace.json {
-        return say(sum.text(name));
+        return say_folded(sum.text(name));
     }
     say(json!({
         "module": arguments.name,

@@ -4,7 +4,7 @@ use super::published::{WatchedModule, data_of};
 use super::target::Target;
 use super::units::{fine, short};
 use super::watch::{FlowFigures, Pace};
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use rohrpost::output::plain;
 use serde_json::json;
 use std::process::ExitCode;
@@ -43,12 +43,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let wide = data.iter().map(|(_, name)| plain::line(name).len()).max().unwrap_or(0);
         for (number, name) in &data {
             let figures = watched.figures(*number);
-            let line = if arguments.pace.json {
-                in_json(&arguments.name, name, figures)
+            let is_read = if arguments.pace.json {
+                say(in_json(&arguments.name, name, figures))
             } else {
-                in_text(&plain::line(name), wide, figures)
+                say_folded(in_text(&plain::line(name), wide, figures))
             };
-            if !say(line) {
+            if !is_read {
                 return Ok(false);
             }
         }

@@ -6,7 +6,7 @@ mod sockets;
 use super::manager::Manager;
 use super::speech::Speech;
 use super::summary::{ModuleLine, module_lines, print_modules_live};
-use crate::terminal::Failure;
+use crate::terminal::{Failure, columns, folded};
 pub(super) use all::{LaunchedNodes, lab};
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::launcher::Phase;
@@ -192,9 +192,10 @@ impl<'a> TerminalView<'a> {
         let excess = self.notes.len().saturating_sub(NOTES_MAX);
         self.notes.drain(..excess);
         let head = format!("{installation}, {} s. Ctrl-C stops it.", self.begun.elapsed().as_secs());
-        // Home, then clear each line to its end, then everything below: no flicker. Long lines are cut, not wrapped, so
-        // that the table keeps its shape.
-        let text = format!("{head}\n{line}\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
+        // Home, then clear each line to its end, then everything below: no flicker. A line that is too long even so is
+        // cut, so that the table keeps its shape.
+        let notes = folded(&self.notes.join("\n"), columns());
+        let text = format!("{head}\n{line}\n{}\n{notes}\n", print_modules_live(lines));
         let text = Lines(text).to_string().replace('\n', "\x1b[K\n");
         let first = if self.last.is_none() { "\x1b[2J" } else { "" };
         self.speech.draw(format!("{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J"));

@@ -4,7 +4,7 @@ use super::summary::{Losses, class_name, losses, print_classes};
 use super::table::{table, time};
 use super::target::{Running, Target};
 use super::units::fine;
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use rohrpost::Name;
 use rohrpost::survey::{MailboxSnapshot, Scope, purpose};
 use rohrpost_config::{Installation, nearest};
@@ -124,7 +124,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let name = running.installation.classes.parse_name(&arguments.name)?;
     let look = running.inspect(name)?.ok_or_else(|| missing(&running, name, &arguments.name))?;
     let seen = MailboxView::new(&running, &look);
-    say(if arguments.json { serde_json::to_string(&seen)? } else { print(&running.installation, &look.detail, &seen) });
+    if arguments.json {
+        say(serde_json::to_string(&seen)?);
+    } else {
+        say_folded(print(&running.installation, &look.detail, &seen));
+    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -5,7 +5,7 @@ mod round_trip;
 use super::table::time;
 use super::target::{Running, Target};
 use super::units::{Stop, seconds};
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use rohrpost::common::TimeReport;
 use rohrpost::survey::Scope;
 use rohrpost::{CallError, Fault, Name};
@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     tool.close();
     let summary = if arguments.json { rounds.json(&arguments.name) } else { rounds.text(&arguments.name) };
-    say(summary);
+    say_folded(summary);
     if rounds.answered == 0 {
         return Err(why_silent(&running, module)?.into());
     }
@@ -103,7 +103,7 @@ fn tell_answer(arguments: &Arguments, number: u64, took: Duration, one_way: &Res
         Ok(one_way) => one_way.text(),
         Err(why) => format!("one-way times unknown: {why}"),
     };
-    say(format_args!("{name}: answer {number} after {} ({one_way})", time(took)))
+    say_folded(format_args!("{name}: answer {number} after {} ({one_way})", time(took)))
 }
 
 fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64, error: &CallError) -> bool {
@@ -114,7 +114,7 @@ fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64
     if arguments.json {
         return say(json!({"module": arguments.name, "number": number, "round_trip_s": null, "error": why}));
     }
-    say(format_args!("{}: none {number}: {why}", arguments.name))
+    say_folded(format_args!("{}: none {number}: {why}", arguments.name))
 }
 
 /// What shared memory shows of a module that does not answer, and what to do.

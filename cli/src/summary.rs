@@ -1,6 +1,7 @@
 //! A node's state as text: modules, and traffic by class.
 
 use super::table::{table, table_of, time};
+use crate::terminal::{columns, folded};
 use rohrpost::Class;
 use rohrpost::common::Status;
 use rohrpost::output::plain;
@@ -10,6 +11,7 @@ use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{ClassTraffic, Loss, saturating_sum};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::iter;
 
 /// A module, as the tables show it.
 #[derive(Clone, Serialize)]
@@ -115,8 +117,10 @@ fn scheduling(scheduling: Option<Scheduling>) -> String {
 /// Modules as a table, one a line; with their nodes if there are several.
 pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
     let mut all = heads(">received").to_vec();
-    let mut rows: Vec<Vec<String>> =
-        lines.iter().map(|line| cells(line, " ", line.received.to_string()).into()).collect();
+    let mut rows: Vec<Vec<String>> = lines.iter().map(|line| cells(line, line.received.to_string()).into()).collect();
+    for (row, line) in rows.iter_mut().zip(lines) {
+        line.aliases.iter().for_each(|alias| row[0] += &format!(" + {alias}"));
+    }
     // A column only if it has any content.
     if lines.iter().any(|line| line.account.error.is_some()) {
         all.push("last error");
@@ -129,33 +133,34 @@ pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
     table_of(&all, rows)
 }
 
-/// The same for a terminal of 80 columns: aliases below their module, and rates; below all, the last errors.
+/// The same for the live table: rates; aliases in lines below their module; below all, the last errors.
 pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
     let rate = |line: &ModuleLine| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}"));
-    let mut text = table(heads(">in/s"), lines.iter().map(|line| cells(line, "\n", rate(line))));
+    let alias = |alias: &String| std::array::from_fn(|at| if at == 0 { format!("+ {alias}") } else { String::new() });
+    let of = |line| iter::once(cells(line, rate(line))).chain(line.aliases.iter().map(alias));
+    let mut text = table(heads(">in/s"), lines.iter().flat_map(of));
     for line in lines.iter().filter(|line| line.account.error.is_some()) {
-        let room = LIVE_COLUMNS.saturating_sub(line.module.len() + 2);
-        text.push_str(&format!("{}: {}\n", line.module, line.account.short_error(room)));
+        let error = format!("{}: {}", line.module, line.account.error.as_deref().unwrap_or_default());
+        text.push_str(&format!("{}\n", folded(&plain::line(&error), columns())));
     }
     text
 }
 
 /// An error, shortened for a table; the whole text is in the JSON.
 const ERROR_MAX: usize = 100;
-const LIVE_COLUMNS: usize = 80;
 
 const HEADS: usize = 9;
 
+/// As `top` has them, so that a table fits into 80 columns.
 const fn heads(received: &str) -> [&str; HEADS] {
-    ["module", "state", ">priority", "scheduling", ">pid", received, ">waiting", ">lost", ">restarts"]
+    ["module", "state", ">prio", "sched", ">pid", received, ">wait", ">lost", ">rst"]
 }
 
 /// Nothing is known of a module that does not answer.
-fn cells(line: &ModuleLine, gap: &str, received: String) -> [String; HEADS] {
-    let aliases: Vec<String> = line.aliases.iter().map(|alias| format!("{gap}+ {alias}")).collect();
+fn cells(line: &ModuleLine, received: String) -> [String; HEADS] {
     let known = |text: String| if line.account.state == Standing::Unreachable { "-".into() } else { text };
     [
-        line.module.clone() + &aliases.concat(),
+        line.module.clone(),
         line.account.state.to_string(),
         line.priority.to_string(),
         line.scheduling.clone(),

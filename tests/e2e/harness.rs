@@ -121,6 +121,16 @@ id = 95
 id = 24
 ";
 
+/// A simulated robot with streams, one of them of pictures; first of a configuration, since classes are before modules.
+pub(crate) fn simulated() -> String {
+    let map = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
+    format!(
+        "{RECORDED_CLASSES}[classes.camera]\nid = 112\n[[module]]\nname = \"motor.0\"\nbuiltin = \"sim\"\n\
+         aliases = [\"odometry.0\", \"laser.0\", \"camera.0\"]\nsettings = {{ map = {map:?}, camera-rate-hz = 2 }}\n\
+         [module.stream.image]\nrecord = \"1 MiB\"\nkeep = 4\n"
+    )
+}
+
 /// Sections of a configuration with several nodes.
 pub(crate) const NETWORK: &str = "[network]\nsecurity = \"none\"\n[time]\nsource = \"master\"\n";
 

@@ -1,15 +1,19 @@
 //! The live table, in a terminal of its own.
 
-use crate::harness::{Place, probe, runs, wait};
+use crate::harness::{OUTPUT, Place, probe, runs, simulated, wait};
 use crate::terminal::Terminal;
+use crate::tools::{at_a_node, commands};
 use nix::sys::signal::Signal;
+
+/// Of the terminal that tools have to fit.
+const COLUMNS: u16 = 80;
 
 #[test]
 fn a_terminal_shows_a_live_table() {
     let place = Place::new();
     let config = place.config(&[&probe("probe.0", "", ""), &probe("probe.1", "", "start = \"off\"")]);
     let (terminal, mut launch) = Terminal::start(&place, &["launch", config.to_str().unwrap()], 24, 100);
-    for words in ["module", "priority", "probe.0", "probe.1", "restarts"] {
+    for words in ["module", "prio", "probe.0", "probe.1", "rst"] {
         terminal.wait_for(words);
     }
     for (rows, columns) in [(1, 1), (3, 10), (200, 500), (24, 80)] {
@@ -56,4 +60,45 @@ fn what_does_not_go_to_a_terminal_holds_no_table() {
     let place = Place::new();
     let (mut launch, _robot) = place.launched(&[&probe("probe.0", "", "")]);
     assert_eq!(launch.stop(), "node main of test runs: 1 module\n", "nothing else happened");
+}
+
+#[test]
+fn a_live_table_has_all_columns_and_all_names_in_eighty_columns() {
+    let place = Place::new();
+    let config = place.config(&[&simulated(), OUTPUT]);
+    let (terminal, mut launch) = Terminal::start(&place, &["launch", config.to_str().unwrap()], 24, COLUMNS);
+    let screen = terminal.wait_screen("the names", |screen| screen.lines().any(|line| line.trim() == "+ camera.0"));
+    for head in ["module", "state", "prio", "sched", "pid", "in/s", "wait", "lost", "rst"] {
+        assert!(screen.split_whitespace().any(|word| word == head), "no {head}:\n{screen}");
+    }
+    assert!(!screen.contains('\\'), "{screen}");
+    launch.signal(Signal::SIGINT);
+    assert!(launch.end().success());
+}
+
+#[test]
+fn every_tool_fits_a_terminal_of_eighty_columns() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&simulated(), OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);
+    robot.wait_on(&mut launch);
+    let asked = "call probe.0 count 1|list -m -s|stream list|stream info camera.0 image|param list|param get motor.0|\
+                 mailbox motor.0.0|delay motor.0 --count 1|hz motor.0 --count 1|graph --seconds 0.2|doctor|\
+                 log --level debug|status|top --once --interval 0.1|call motor.0";
+    let asked = asked.split('|').map(|words| words.split(' ').collect::<Vec<_>>());
+    // These change the node, or speak until they are stopped.
+    let left_out = ["restart", "stop", "start", "hz", "bw", "delay", "ping", "echo"];
+    let all = commands(&place);
+    let each = all.iter().filter(|command| !left_out.contains(&&***command)).filter_map(|command| at_a_node(command));
+    let mut too_wide = Vec::new();
+    for tool in asked.chain(each) {
+        let (terminal, mut running) = Terminal::start(&place, &tool, 24, COLUMNS);
+        running.end();
+        let drawn = terminal.to_the_end();
+        assert!(!drawn.is_empty(), "{tool:?} says nothing");
+        let widest = drawn.lines().max_by_key(|line| line.chars().count()).unwrap_or_default();
+        if widest.chars().count() > COLUMNS.into() {
+            too_wide.push(format!("{tool:?}: {widest}"));
+        }
+    }
+    assert!(too_wide.is_empty(), "{too_wide:#?}");
 }

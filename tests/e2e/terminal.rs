@@ -133,6 +133,12 @@ impl Terminal {
         assert!(flags.contains(LocalFlags::ECHO | LocalFlags::ICANON | LocalFlags::ISIG), "{flags:?}");
     }
 
+    /// All that was drawn, once nobody has it open any more.
+    pub(crate) fn to_the_end(mut self) -> String {
+        self.reader.take().unwrap().join().unwrap();
+        self.drawn()
+    }
+
     /// Closes it while the command runs.
     pub(crate) fn close(mut self) {
         self.closing.store(true, Ordering::Release);

@@ -11,7 +11,7 @@ mod protection;
 mod rights;
 mod security;
 
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use finding::{Finding, Grade};
 pub(super) use machine::room_of_nodes;
 use machine::{Machine, Needs};
@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if arguments.json {
         say(json(&findings));
     } else {
-        say(page(&findings));
+        say_folded(page(&findings));
     }
     let bad = findings.iter().any(|finding| finding.state == Grade::Bad);
     Ok(if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })

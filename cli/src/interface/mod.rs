@@ -23,7 +23,7 @@ mod tests;
 mod texts;
 
 use super::target::Target;
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use rohrpost::output::plain;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -83,7 +83,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.action {
         InterfaceCommand::Export(export) => {
             let description = export::find(&export.name, &export.target)?;
-            say(if export.json { file::write(&description)? } else { crate::call::listing(&description) });
+            if export.json {
+                say(file::write(&description)?);
+            } else {
+                say_folded(crate::call::listing(&description));
+            }
         }
         InterfaceCommand::Generate(Generate { lang, file }) => {
             let code = file::load(file)

@@ -2,7 +2,7 @@
 
 use super::arguments::Arguments;
 use super::filter::Filter;
-use crate::terminal::{complain, say};
+use crate::terminal::{complain, say, say_folded};
 use rohrpost::output::OutputLine;
 use rohrpost_builtin::format::Format;
 
@@ -16,7 +16,7 @@ pub(super) struct Show<'a> {
 impl Show<'_> {
     /// False when nobody reads any more.
     pub(super) fn line(&self, line: &OutputLine) -> bool {
-        say(if self.arguments.json { self.format.json(line) } else { self.format.short(line) })
+        if self.arguments.json { say(self.format.json(line)) } else { say_folded(self.format.short(line)) }
     }
 
     /// A notice of the tool between the lines; programs get only lines.
@@ -25,6 +25,6 @@ impl Show<'_> {
             complain(format_args!("… {note}"));
             return true;
         }
-        say(format_args!("… {note}"))
+        say_folded(format_args!("… {note}"))
     }
 }

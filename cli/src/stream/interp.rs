@@ -6,7 +6,7 @@ use super::moment::{StreamMoment, parse_moment};
 use super::output::{RecordContent, RecordForm, RecordObject};
 use super::refusal::{AroundRefusal, around_or_refusal};
 use super::stamp::stamp_text;
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use crate::units::{LOOK, Stop};
 use rohrpost::Name;
 use rohrpost::fusion::Share;
@@ -178,7 +178,7 @@ impl Interpolated {
         };
         let before = form.line(Some("before"), &before.0, RecordContent::Value(before.1))?;
         let after = form.line(Some("after"), &after.0, RecordContent::Value(after.1))?;
-        say(format_args!("{value}\nat {}, {from}\n{before}\n{after}", stamp_text(at.ns)));
+        say_folded(format_args!("{value}\nat {}, {from}\n{before}\n{after}", stamp_text(at.ns)));
         Ok(ExitCode::SUCCESS)
     }
 }

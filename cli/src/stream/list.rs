@@ -5,7 +5,7 @@ use super::view::{StreamView, name_items, print_stream, print_streams, stream_vi
 use crate::list::{NodeLine, node_lines};
 use crate::observer::Silence;
 use crate::target::{Running, Target};
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use rohrpost::survey::{Scope, StreamSurvey};
 use rohrpost_mailbox::monotonic_ns;
 use serde::Serialize;
@@ -87,6 +87,10 @@ pub(super) fn info(arguments: &InfoArguments) -> Result<ExitCode, Failure> {
     let seen = StreamSurvey { node: chosen.running.node_name.clone(), at_ns: monotonic_ns(), info };
     let item = chosen.item.as_ref().map(|item| item.field.name.clone());
     let view = StreamView::new(&seen, item, |name| chosen.running.text(name)).of(&chosen.running.installation);
-    say(if arguments.json { serde_json::to_string(&view)? } else { print_stream(&view) });
+    if arguments.json {
+        say(serde_json::to_string(&view)?);
+    } else {
+        say_folded(print_stream(&view));
+    }
     Ok(ExitCode::SUCCESS)
 }

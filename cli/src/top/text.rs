@@ -3,7 +3,6 @@
 use super::super::table;
 use super::columns::{Column, short};
 use super::model::{Model, TimeNow};
-use rohrpost::output::plain;
 use rohrpost::survey::Standing;
 use rohrpost_builtin::format::iso;
 
@@ -11,32 +10,6 @@ use rohrpost_builtin::format::iso;
 pub(super) fn date(time_ns: u64) -> String {
     let text = iso(time_ns).replace('T', " ");
     format!("{} UTC", text.split('.').next().unwrap_or_default())
-}
-
-/// A line in pieces of at most this many characters, broken at blanks where possible; the later pieces are indented
-/// like the line itself, and a little more.
-pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
-    // A module may print anything; on the screen a line stays one line.
-    let text = plain::line(text);
-    let indent = (text.chars().take_while(|letter| *letter == ' ').count() + 2).min(width / 3);
-    let mut pieces = Vec::new();
-    let mut rest: Vec<char> = text.trim_end().chars().collect();
-    let mut before = 0;
-    while rest.len() + before > width && width > before {
-        let room = width - before;
-        let blank = rest[..=room.min(rest.len() - 1)].iter().rposition(|letter| *letter == ' ');
-        // A blank in the indentation, or too far to the left, is no place to break.
-        let at = blank.filter(|at| *at > room / 2).unwrap_or(room);
-        let piece: String = rest.drain(..at).collect();
-        pieces.push(" ".repeat(before) + piece.trim_end());
-        let blanks = rest.iter().take_while(|letter| **letter == ' ').count();
-        rest.drain(..blanks);
-        before = indent;
-    }
-    if !rest.is_empty() || pieces.is_empty() {
-        pieces.push(" ".repeat(before) + &rest.into_iter().collect::<String>());
-    }
-    pieces
 }
 
 /// The whole output as plain text, for `--once`.
@@ -107,24 +80,4 @@ pub(super) fn help() -> Vec<String> {
     lines.extend(Column::ALL.iter().map(|column| format!("  {:<12} {}", column.head(), column.text())));
     lines.extend(["".into(), "contents".into(), WHAT.into()]);
     lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_lines_are_broken_at_blanks_without_loss() {
-        assert_eq!(wrap("one two three", 8), ["one two", "  three"]);
-        assert_eq!(wrap("  one two three", 10), ["  one two", "   three"]);
-        assert_eq!(wrap("abcdefghij", 4), ["abcd", " efg", " hij"]);
-        assert_eq!(wrap("", 4), [""]);
-        assert_eq!(wrap("a\u{1b}[31m\tb", 20), ["a\\u001b[31m\\tb"]);
-        for width in 0..30 {
-            for piece in wrap("  a rather long line with averyverylongwordinit and more", width) {
-                assert!(piece.chars().count() <= width.max(56), "{width}: {piece:?}");
-                assert!(width < 4 || piece.chars().count() <= width, "{width}: {piece:?}");
-            }
-        }
-    }
 }
