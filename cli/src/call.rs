@@ -1,8 +1,9 @@
 //! `rohrpost call`: calls a function of any module, using the module's own description.
 
-use super::target::Target;
+use super::stream::too_large_for_data;
+use super::target::{Running, Target};
 use super::units::seconds;
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, say, say_folded};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::output::plain;
 use rohrpost::schema::{
@@ -59,15 +60,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let module = running.module(&arguments.name)?;
     let mut tool = running.join(seconds(arguments.timeout)?)?;
-    let result = answer(arguments, module, &mut tool);
+    let result = answer(arguments, &running, module, &mut tool);
     tool.close();
     let (text, failed) = result.map_err(|error| running.told(module, &*error))?;
-    say(text);
+    if arguments.json {
+        say(text)
+    } else {
+        say_folded(text)
+    };
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
 /// The text to print, and whether the function itself reported an error.
-fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(String, bool), Failure> {
+fn answer(
+    arguments: &Arguments,
+    running: &Running,
+    module: Name,
+    tool: &mut ToolLink,
+) -> Result<(String, bool), Failure> {
     let Some(name) = &arguments.function else {
         let description = tool.describe(module)?;
         let text = if arguments.json { serde_json::to_string(&description)? } else { listing(&description) };
@@ -81,7 +91,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
             serde_json::from_value(json)?
         }
         ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|_| Value::Null)?,
-        ("get", [data]) => get(module, data, tool)?,
+        ("get", [data]) => get(running, module, data, tool)?,
         (common, texts) if let Some(right) = usage_of_common(common) => {
             return Err(format!("`{common}` takes {right}, not {} arguments", texts.len()).into());
         }
@@ -107,12 +117,15 @@ pub(super) fn level_of(text: &str) -> Result<OutputLevel, Failure> {
     level.ok_or_else(|| format!("no level `{text}`; there are error, warn, info, debug, trace").into())
 }
 
-fn get(module: Name, data: &str, tool: &mut ToolLink) -> Result<Value, Failure> {
+fn get(running: &Running, module: Name, data: &str, tool: &mut ToolLink) -> Result<Value, Failure> {
     let description = tool.describe(module)?;
     let item = description.data_item(data).ok_or_else(|| {
         let names: Vec<&str> = description.data.iter().map(|item| item.field.name.as_str()).collect();
         format!("no data `{data}`; it has: {}", names.join(", "))
     })?;
+    if let Some(why) = too_large_for_data(running, module, item) {
+        return Err(why);
+    }
     let number = item.number;
     let write = |body: &mut Vec<u8>| rohrpost::wire::append(body, &(number,));
     let bytes = tool.call(module, common::GET_DATA, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;

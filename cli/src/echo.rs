@@ -1,7 +1,8 @@
 //! `rohrpost echo`: prints the data that a module publishes, using the module's own description.
 
-use super::target::Target;
-use crate::terminal::{Failure, say};
+use super::stream::too_large_for_data;
+use super::target::{Running, Target};
+use crate::terminal::{Failure, say, say_folded};
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use rohrpost::schema::{DataItem, Description, decode};
 use rohrpost::{Name, ToolLink};
@@ -43,15 +44,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let module = running.module(&arguments.name)?;
     let mut tool = running.join(PATIENCE)?;
-    let result = echo(arguments, module, &mut tool);
+    let result = echo(arguments, &running, module, &mut tool);
     tool.close();
     result.map(|()| ExitCode::SUCCESS).map_err(|error| running.told(module, &*error))
 }
 
-fn echo(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(), Failure> {
+fn echo(arguments: &Arguments, running: &Running, module: Name, tool: &mut ToolLink) -> Result<(), Failure> {
     let description = tool.describe(module)?;
     let item =
         choose(&description, arguments.data.as_deref()).map_err(|error| format!("{}: {error}", arguments.name))?;
+    if let Some(why) = too_large_for_data(running, module, item) {
+        return Err(why);
+    }
     let rate_us = if arguments.rate > 0.0 { (1e6 / arguments.rate) as u32 } else { 0 };
     let mailbox = local::DATA;
     let wish =
@@ -119,7 +123,8 @@ fn follow(
             format!("{}.{:09} #{} {value}", head.stamp_ns / 1_000_000_000, head.stamp_ns % 1_000_000_000, head.sequence)
         };
         count += 1;
-        if !say(line) || arguments.count.is_some_and(|wanted| count >= wanted) {
+        let is_read = if arguments.json { say(line) } else { say_folded(line) };
+        if !is_read || arguments.count.is_some_and(|wanted| count >= wanted) {
             return Ok(());
         }
     }

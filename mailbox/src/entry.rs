@@ -37,10 +37,15 @@ impl ModuleState {
         }
     }
 
+    /// From the state of a line, which may complain besides.
     fn from_code(code: u32) -> Option<Self> {
+        let code = code & !COMPLAINS;
         [Self::Starting, Self::Off, Self::On, Self::Error, Self::Stopping].into_iter().find(|s| *s as u32 == code)
     }
 }
+
+/// With its state a module says that something does not work although it is on.
+pub(crate) const COMPLAINS: u32 = 1 << 8;
 
 /// One participant's line.
 #[repr(C, align(64))]
@@ -57,7 +62,7 @@ pub(crate) struct Entry {
     pub(crate) joined_ns: AtomicU64,
     /// Not 0: it sleeps in `poll`; ring it through its pipe too.
     pub(crate) polling: AtomicU32,
-    /// Times that the module went into error.
+    /// Times that the module went into error, or began another complaint.
     pub(crate) errors: AtomicU32,
     /// What its thread has in hand. Senders touch this line only to wake it, which they do when it has nothing.
     pub(crate) mark: Mark,
@@ -76,7 +81,12 @@ pub struct ParticipantInfo {
     pub incarnation: u32,
     /// What the module is doing; none for participants that are no modules.
     pub state: Option<ModuleState>,
-    /// Times that it went into error: tells one error from the next, however short the time between them.
+    /// Whether something does not work although it is on; [what], it says itself when it is asked.
+    ///
+    /// [what]: crate::Participant::set_complaint
+    pub complains: bool,
+    /// Times that it went into error or began another complaint: tells one from the next, however short the time
+    /// between them.
     pub errors: u32,
     /// Times that launch has started it again.
     pub restarts: u32,
@@ -92,11 +102,14 @@ impl Entry {
     }
 
     pub(crate) fn read(&self) -> ParticipantInfo {
+        let module = Name::from_raw(self.module.load(Ordering::Acquire));
+        let state = self.state.load(Ordering::Acquire);
         ParticipantInfo {
-            module: Name::from_raw(self.module.load(Ordering::Acquire)),
+            module,
             pid: self.pid.load(Ordering::Relaxed),
             incarnation: self.incarnation.load(Ordering::Relaxed),
-            state: ModuleState::from_code(self.state.load(Ordering::Acquire)),
+            state: ModuleState::from_code(state),
+            complains: state & COMPLAINS != 0,
             // Behind the state, which is stored behind it.
             errors: self.errors.load(Ordering::Relaxed),
             restarts: self.restarts.load(Ordering::Relaxed),

@@ -25,7 +25,7 @@ use std::time::Duration;
 /// `rohrpost` in ASCII, little-endian.
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"rohrpost");
 /// Raised with every change of a layout in shared memory.
-pub const VERSION: u32 = 8;
+pub const VERSION: u32 = 9;
 pub(crate) const PAGE: usize = 4096;
 /// Bytes of a slot before its body: time of publishing and head.
 pub(crate) const SLOT_PREFIX: usize = 8 + HEAD_BYTES;

@@ -1,7 +1,7 @@
 //! A participant: one user of mailboxes on a node, mostly a process.
 
 use crate::doorbell;
-use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX};
+use crate::entry::{COMPLAINS, Entry, ModuleState, PARTICIPANTS_MAX};
 use crate::files::open_shared;
 use crate::lock;
 use crate::name::Name;
@@ -99,7 +99,21 @@ impl Participant {
             // Relaxed: the Release of the state hands it over, too.
             self.entry().errors.fetch_add(1, Ordering::Relaxed);
         }
-        self.entry().state.store(state as u32, Ordering::Release);
+        // The module alone writes it.
+        let complains = self.entry().state.load(Ordering::Relaxed) & COMPLAINS;
+        self.entry().state.store(state as u32 | complains, Ordering::Release);
+    }
+
+    /// Says that something does not work although the module is on, such as a subscription that is refused, or that all
+    /// does. Each call that says so is another complaint, to be asked for.
+    pub fn set_complaint(&self, complains: bool) {
+        let (entry, complaint) = (self.entry(), if complains { COMPLAINS } else { 0 });
+        if complains {
+            // Relaxed: the Release of the state hands it over, too.
+            entry.errors.fetch_add(1, Ordering::Relaxed);
+        }
+        let state = entry.state.load(Ordering::Relaxed) & !COMPLAINS;
+        entry.state.store(state | complaint, Ordering::Release);
     }
 
     /// Says how often launch has started this module again.

@@ -49,7 +49,8 @@ pub const EXCHANGE_PAGE: usize = 8;
 pub struct Status {
     /// What it is doing.
     pub state: State,
-    /// Why, when it is in error; else empty.
+    /// Why, when it is in error; else what does not work although it is on, such as a subscription that is refused; or
+    /// empty.
     pub error: String,
     /// Tells this incarnation of the module from earlier ones.
     pub incarnation: u32,

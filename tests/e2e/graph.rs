@@ -1,6 +1,6 @@
 //! `graph`: all flows with sender and receiver, as a table, as JSON, and drawn.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, probe, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, probe, simulated, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use serde_json::Value;
@@ -28,6 +28,37 @@ fn data_in_a_mailbox_of_ones_own_are_named() {
     assert_eq!(flows("probe.1"), [data("beat")], "its data mailbox, and one of its own");
     assert_eq!(flows("probe.2"), [data("blob")]);
     assert!(flows("output.0").contains(&["probe.1", "output", "lines"].map(str::to_owned)), "{:?}", flows("output.0"));
+}
+
+#[test]
+fn readers_of_streams_are_in_the_table_and_in_the_drawing() {
+    let place = Place::new();
+    let mapper = "[[module]]\nname = \"mapper.0\"\nbuiltin = \"mapper\"\ncalls = [\"laser.0\", \"odometry.0\"]\n\
+                  settings = { laser = \"laser.0\", odometry = \"odometry.0\" }\n";
+    let (mut launch, robot) = place.launched(&[&simulated(), OUTPUT, mapper]);
+    robot.wait_on(&mut launch);
+    let edges = wait("the mapper reads what the motor writes", || {
+        let graph = place.say(&["graph", "--seconds", "0.5", "--json"]).json();
+        let edges = graph["edges"].as_array().unwrap().iter().filter(|edge| edge["carries"] == "stream");
+        let edges: Vec<Value> = edges.cloned().collect();
+        (edges.len() == 2).then_some(edges)
+    });
+    let said = |edge: &Value| ["from", "to", "what"].map(|key| edge[key].as_str().unwrap().to_owned());
+    assert_eq!(said(&edges[0]), ["motor.0", "mapper.0", "odometry"]);
+    assert_eq!(said(&edges[1]), ["motor.0", "mapper.0", "scan"]);
+    for edge in &edges {
+        assert!(edge["packages"].as_u64().unwrap() > 0 && edge["bytes_per_s"].as_f64().unwrap() > 0.0, "{edge}");
+    }
+    // Where a stream cannot travel as data, its own command is named; where it can, it is printed.
+    wait("a picture", || (place.say(&["stream", "read", "camera.0", "image"]).code == Some(0)).then_some(()));
+    for words in [&["echo", "camera.0", "--count", "1"][..], &["call", "camera.0", "get", "image"]] {
+        let said = place.say(words).fails();
+        assert!(said.contains("`rohrpost stream read camera.0 image` prints the newest record"), "{words:?}: {said}");
+    }
+    assert!(!place.say(&["log", "--level", "error"]).ok().contains("image"), "nobody was asked for it");
+    assert_eq!(place.say(&["echo", "odometry.0", "--count", "1"]).ok().lines().count(), 1);
+    let drawn = place.say(&["graph", "--seconds", "0.5", "--svg"]).ok();
+    assert!(drawn.contains(">scan ") && drawn.contains(">odometry "), "{drawn}");
 }
 
 #[test]

@@ -25,6 +25,7 @@ fn made_and_tested(place: &Place, words: &[&str]) -> PathBuf {
     let made = place.say(&[&["new"], words].concat()).ok();
     assert!(made.contains("cargo build && rohrpost launch robot.toml"), "{made}");
     let project = place.path(words[0]);
+    compile_what_the_readme_writes(&project);
     // The versions that are here already.
     std::fs::copy(Path::new(ROOT).join("Cargo.lock"), project.join("Cargo.lock")).unwrap();
     // target/debug/deps/e2e-…
@@ -36,6 +37,21 @@ fn made_and_tested(place: &Place, words: &[&str]) -> PathBuf {
     let built = cargo(&project, "build").output().unwrap();
     assert!(built.status.success(), "{built:?}");
     project
+}
+
+/// The lines of Rust in the project's README, as a function of its library.
+fn compile_what_the_readme_writes(project: &Path) {
+    let read = |file: &str| std::fs::read_to_string(project.join(file)).unwrap();
+    let readme = read("README.md");
+    let blocks = readme.split("```rust\n").skip(1).map(|block| block.split("```").next().unwrap());
+    // What `new` stores, `received` has.
+    let written = blocks.collect::<String>().replace("self.", "");
+    assert!(written.contains("context.subscribe"), "{readme}");
+    let function = format!(
+        "\n/// What the README writes.\n#[allow(unused_variables)]\npub fn as_the_readme_says(\n    context: &mut \
+         Context,\n    data: &rohrpost::Received<'_>,\n) -> Result<(), ModuleError> {{\n{written}\nOk(())\n}}\n"
+    );
+    std::fs::write(project.join("src/lib.rs"), read("src/lib.rs") + &function).unwrap();
 }
 
 /// Build products of a removed project are useless.

@@ -1,11 +1,11 @@
 //! A subscriber names the mailbox for the data, and takes only what it asked for there.
 
-use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
+use crate::harness::{PATIENCE, Place, Robot, halt, probe, program, signal, wait};
 use crate::probe::{NEWEST, ProbingInterface, SWAPPED};
 use nix::sys::signal::Signal;
-use rohrpost::ToolLink;
 use rohrpost::common::{DataHead, GET_DATA, Refused, SUBSCRIBE, Subscribe};
 use rohrpost::wire::{append, from_bytes};
+use rohrpost::{Context, Module, ModuleError, ToolLink};
 use rohrpost_mailbox::{Kind, Label, Loss, Name, Options, Participant, Shape, Type, local};
 use rohrpost_modules::call::CallEnvelope;
 
@@ -61,6 +61,87 @@ fn a_mailbox_of_ones_own_holds_the_newest_and_the_other_holds_each() {
     let list = place.say(&["list", "-m"]).ok();
     assert!(list.lines().any(|line| line.contains("probe.1.3") && line.contains("latest")), "{list}");
     tool.close();
+    launch.stop();
+}
+
+/// An older interface of probes: what they beat is another type.
+#[rohrpost::interface(class = "probe")]
+trait OldProbing {
+    /// A beat.
+    #[data(1)]
+    fn beat() -> String;
+}
+
+/// Whatever the settings of a probe are.
+#[derive(rohrpost::serde::Deserialize)]
+#[serde(crate = "rohrpost::serde")]
+struct AnySettings {}
+
+struct OldProbe;
+
+impl Module for OldProbe {
+    type Settings = AnySettings;
+    type Interfaces = OldProbingInterface;
+
+    fn new(_: Self::Settings, _: &mut Context) -> Result<Self, ModuleError> {
+        Ok(Self)
+    }
+}
+
+impl OldProbing for OldProbe {}
+
+/// Not a test: a module that launch starts. Run as a test it ends at once.
+#[test]
+fn old_probe() {
+    if std::env::var_os("ROHRPOST_MODULE").is_some() {
+        let code = rohrpost::run::<OldProbe>();
+        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
+    }
+}
+
+/// The publisher is built anew with another interface, and then as it was.
+#[test]
+fn a_subscription_that_an_interface_ends_is_seen_by_all_tools_and_comes_back_when_they_agree() {
+    let place = Place::new();
+    let old = place.path("old");
+    let [old_program, new_program] = ["subscribe::old_probe", "probe::module"].map(|test| {
+        let program: Vec<String> = serde_json::from_str(&program(test)).unwrap();
+        program.iter().map(|word| format!("'{word}'")).collect::<Vec<_>>().join(" ")
+    });
+    let choose = format!("if [ -e '{}' ]; then exec {old_program}; else exec {new_program}; fi", old.display());
+    let publisher = probe("probe.0", "rate-hz = 100.0", "")
+        .replace(&program("probe::module"), &format!("[\"/bin/sh\", \"-c\", {choose:?}]"));
+    let subscriber = probe("probe.1", "hears = \"probe.0\"", "calls = [\"probe.0\"]");
+    let (mut launch, robot) = place.launched(&[&publisher, &subscriber]);
+    robot.wait_on(&mut launch);
+    wait("beats come", || (!heard(&place, "each").is_empty()).then_some(()));
+    std::fs::write(&old, "").unwrap();
+    place.say(&["restart", "probe.0"]).ok();
+    let words = "subscription to `beat` of probe.0: interface differs";
+    let what = "there, number 1 is `beat: text`; this program takes `beat: u64`";
+    let error = |tool: &[&str]| {
+        let told = place.say(&[tool, &["--json"]].concat()).json();
+        let modules = told.get("modules").unwrap_or(&told).as_array().unwrap().clone();
+        let line = modules.into_iter().find(|line| line["module"] == "probe.1").unwrap();
+        assert_eq!(line["state"], "on", "{line}");
+        line["error"].as_str().unwrap_or_default().to_owned()
+    };
+    for tool in [&["status"][..], &["list"], &["top"]] {
+        wait(format!("{tool:?} tells"), || {
+            let error = error(tool);
+            (error.contains(words) && error.contains(what)).then_some(())
+        });
+    }
+    launch.wait_for(words);
+    std::fs::remove_file(&old).unwrap();
+    let before = heard(&place, "each").len();
+    place.say(&["restart", "probe.0"]).ok();
+    wait("beats come again", || (heard(&place, "each").len() > before + 5).then_some(()));
+    // Tables keep the last error; the module itself has none any more.
+    wait("nothing is complained of", || {
+        (place.say(&["call", "probe.1", "status", "--json"]).json()["error"] == "").then_some(())
+    });
+    drop(robot);
     launch.stop();
 }
 

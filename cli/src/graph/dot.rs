@@ -22,6 +22,7 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
     for edge in graph.drawn(all) {
         let style = match edge.carries {
             Carries::Data => "",
+            Carries::Stream => ", color = \"#2a6fb5\", style = bold",
             Carries::Command | Carries::Common => ", style = bold, color = \"#b5432a\"",
             Carries::Reply => ", style = dotted",
             Carries::Output => ", color = gray",

@@ -1,4 +1,5 @@
-//! `rohrpost graph`: senders, receivers, content and rates of packages, read from the senders' counters.
+//! `rohrpost graph`: senders, receivers, content and rates of packages, read from the senders' counters; and readers of
+//! streams.
 
 mod dot;
 mod parts;
@@ -13,8 +14,8 @@ use super::watch::Tracks;
 use crate::terminal::{Failure, say};
 use parts::{Carries, Edge, Graph, Module};
 use rohrpost::Name;
-use rohrpost::survey::{Scope, Survey, is_hop};
-use rohrpost_mailbox::{FlowInfo, Kind};
+use rohrpost::survey::{Scope, StreamSurvey, Survey, is_hop};
+use rohrpost_mailbox::{FlowInfo, Kind, StreamId};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -89,7 +90,7 @@ impl Graph {
         let nodes = running.shown();
         let mut tracks: Vec<Tracks> = nodes.iter().map(|_| Tracks::new(Duration::MAX)).collect();
         let stop = Stop::new()?;
-        look(running, &nodes, &mut tracks)?;
+        let (before, _) = look(running, &nodes, &mut tracks)?;
         let began = Instant::now();
         // Ctrl-C ends it early: the observation is then shorter.
         stop.within(long);
@@ -129,6 +130,7 @@ impl Graph {
                 None => edges.push(edge),
             }
         }
+        edges.extend(stream_edges(&mut names, &before, silent, interval_s));
         edges.sort_by(|a, b| (&a.from, &a.to, a.carries, &a.what).cmp(&(&b.from, &b.to, b.carries, &b.what)));
         let classes = &running.installation.classes;
         let mut modules: Vec<Module> = survey
@@ -157,6 +159,36 @@ impl Graph {
         let nodes = nodes.into_iter().map(Into::into).collect();
         Ok(Self { installation, node: running.node_name.clone(), nodes, silent: away, interval_s, modules, edges })
     }
+}
+
+/// From writers of streams to their readers. Nobody sends a record: a reader looks at it where it was written.
+fn stream_edges(names: &mut Names<'_>, before: &[Survey], silent: bool, interval_s: f64) -> Vec<Edge> {
+    let mut edges = Vec::new();
+    let survey = names.survey;
+    for StreamSurvey { node, info, .. } in &survey.streams {
+        let earlier = before.iter().flat_map(|survey| &survey.streams);
+        let earlier = earlier.filter(|known| (&known.node, known.info.id) == (node, info.id)).map(|known| &known.info);
+        // Of a ring that was made anew, all.
+        let records =
+            info.written - earlier.map(|known| known.written).next().filter(|n| *n <= info.written).unwrap_or(0);
+        if records == 0 && !silent {
+            continue;
+        }
+        let per_s = records as f64 / interval_s;
+        let newest_bytes = info.newest.map_or(0, |newest| newest.len_bytes);
+        let what = names.stream(info.id);
+        edges.extend(info.reader_modules.iter().map(|reader| Edge {
+            from: names.process(info.id.name),
+            to: names.process(*reader),
+            carries: Carries::Stream,
+            what: what.clone(),
+            packages: records,
+            packages_per_s: per_s,
+            bytes_per_s: per_s * newest_bytes as f64,
+            refused: info.refused,
+        }));
+    }
+    edges
 }
 
 /// Observes all nodes, and records what each module sends.
@@ -195,6 +227,13 @@ impl Names<'_> {
         class == Some(mailbox.class()) && mailbox.local() == rohrpost::output::LINES
     }
 
+    /// A stream by its name, or by its number.
+    fn stream(&mut self, id: StreamId) -> String {
+        let ask = |module| self.running.describe(module).ok();
+        let named = self.vocabulary.word(Kind::Data(id.number), id.name, id.name, ask);
+        named.unwrap_or_else(|| format!("stream {}", id.number))
+    }
+
     fn what(&mut self, flow: &FlowInfo) -> (Carries, String) {
         let kind = flow.kind.kind();
         if matches!(kind, Kind::Data(_)) && self.is_collector(flow.to) {
@@ -226,6 +265,7 @@ fn edges_in_text(graph: &Graph) -> String {
     let rows = graph.edges.iter().map(|edge| {
         let kind = match edge.carries {
             Carries::Data => "data",
+            Carries::Stream => "stream",
             Carries::Command | Carries::Common => "command",
             Carries::Reply => "reply",
             Carries::Output => "output",

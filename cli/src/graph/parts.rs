@@ -46,6 +46,8 @@ impl Module {
 #[serde(rename_all = "lowercase")]
 pub(super) enum Carries {
     Data,
+    /// Records that a module reads where they were written.
+    Stream,
     Command,
     /// A command that every module understands.
     Common,

@@ -63,7 +63,7 @@ fn box_of(graph: &Graph, module: &Module) -> Element {
 
 fn arrow_of(edge: &Edge) -> Arrow {
     let (ink, dashed) = match edge.carries {
-        Carries::Data => (DATA, LineStyleKind::Normal),
+        Carries::Data | Carries::Stream => (DATA, LineStyleKind::Normal),
         Carries::Command => (COMMAND, LineStyleKind::Normal),
         Carries::Common => (COMMAND, LineStyleKind::Dashed),
         Carries::Reply => (REPLY, LineStyleKind::Dashed),

@@ -3,10 +3,12 @@
 use crate::target::{Running, Target};
 use crate::terminal::Failure;
 use rohrpost::Name;
+use rohrpost::common::DataHead;
 use rohrpost::description::noted;
 use rohrpost::output::plain;
-use rohrpost::schema::{DataItem, Description};
-use rohrpost_mailbox::{StreamError, StreamId, StreamInfo};
+use rohrpost::schema::{DataItem, DataKind, Description};
+use rohrpost::survey::Scope;
+use rohrpost_mailbox::{BODY_BYTES_MAX, StreamError, StreamId, StreamInfo};
 
 #[derive(clap::Args)]
 pub(super) struct StreamChoice {
@@ -121,6 +123,28 @@ fn find_item(stream: &str, text: &str, description: Option<&Description>) -> Res
         (None, _) => format!("{stream} has no stream `{text}`; it has: {}", names.join(", ")),
     }
     .into())
+}
+
+/// Why a command for data cannot have this: it is a stream with records that do not fit into a package, so another
+/// command prints it. None where they fit, and where its node does not answer.
+pub(crate) fn too_large_for_data(running: &Running, module: Name, item: &DataItem) -> Option<Failure> {
+    if item.kind != DataKind::Stream {
+        return None;
+    }
+    let node = running.node_of(module);
+    let survey = running.look(node, Scope::Module(module.raw())).ok()?;
+    let id = StreamId { name: module, number: item.number };
+    let bytes = survey.streams.iter().find(|stream| stream.info.id == id)?.info.newest?.len_bytes;
+    let bytes_max = BODY_BYTES_MAX - DataHead::BYTES;
+    let (module, name) = (running.text(module), plain::line(&item.field.name));
+    let place = if node == running.node_name { String::new() } else { format!(" on the computer of node {node}") };
+    (bytes > bytes_max).then(|| {
+        format!(
+            "`{name}` of {module} is a stream with records of {bytes} B; at most {bytes_max} B travel as data. \
+             `rohrpost stream read {module} {name}`{place} prints the newest record, with `--next 10` the next ones"
+        )
+        .into()
+    })
 }
 
 /// What a module's description says of its stream.

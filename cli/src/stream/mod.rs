@@ -18,7 +18,7 @@ mod view;
 mod write;
 
 use crate::terminal::Failure;
-pub(super) use choice::{completed_items, completed_names};
+pub(super) use choice::{completed_items, completed_names, too_large_for_data};
 pub(super) use stamp::{Offset, parse_offset, parse_stamp, stamp_text};
 use std::process::ExitCode;
 pub(super) use view::{StreamView, name_items, print_streams, stream_views};

@@ -254,6 +254,7 @@ mod tests {
             oldest: record(36, Duration::from_secs(2)),
             newest: record(99, Duration::from_millis(30)),
             readers: 2,
+            reader_modules: Vec::new(),
             holding: 1,
             sleeping: 1,
             missed: Missed { lost: 3, sampled: 4, passed_over: 5 },

@@ -40,6 +40,8 @@ pub struct StreamInfo {
     pub newest: Option<RecordInfo>,
     /// Readers now.
     pub readers: u16,
+    /// The modules among them, each once.
+    pub reader_modules: Vec<Name>,
     /// Readers that read a record in place now.
     pub holding: u16,
     /// Readers that sleep until the next record.
@@ -79,6 +81,11 @@ impl Node {
         let newest = ring.newest();
         let left_out = newest.map_or_else(LeftOut::default, |line| line.about.left_out);
         let taken: Vec<_> = (OWNER_BYTE + 1..).zip(ring.seats()).filter(|(byte, _)| is_taken(&file, *byte)).collect();
+        let mut reader_modules: Vec<Name> =
+            taken.iter().map(|(_, seat)| Name::from_raw(seat.module.load(Ordering::Relaxed))).collect();
+        reader_modules.sort_unstable();
+        reader_modules.dedup();
+        reader_modules.retain(|module| *module != Name::NONE);
         Ok(Some(StreamInfo {
             id,
             shape: segment.shape,
@@ -89,6 +96,7 @@ impl Node {
             oldest: lookup::oldest(&ring).map(|line| RecordInfo::of(&segment, &line)),
             newest: newest.map(|line| RecordInfo::of(&segment, &line)),
             readers: taken.len() as u16,
+            reader_modules,
             holding: taken.iter().filter(|(_, seat)| seat.hold.load(Ordering::Relaxed) != 0).count() as u16,
             sleeping: taken.iter().filter(|(_, seat)| seat.sleeper.load(Ordering::Relaxed) != 0).count() as u16,
             missed: Missed {

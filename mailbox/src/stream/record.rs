@@ -126,7 +126,7 @@ impl TakenSeat {
         };
         step!("seat: locked");
         let seat = lock.byte() as usize - 1;
-        segment.ring().sit_down(seat);
+        segment.ring().sit_down(seat, participant.module().raw());
         Ok(Some(Self { segment, seat, lock }))
     }
 

@@ -87,6 +87,8 @@ pub(crate) struct IndexEntry {
 pub(crate) struct Seat {
     /// The frame that the writer must go round, plus one; 0: none.
     pub(crate) hold: AtomicU32,
+    /// Name of the module that reads, or 0; for tools.
+    pub(crate) module: AtomicU32,
     /// Not 0: the reader sleeps, or is about to. Which bell to ring, as the reader chose to write it.
     pub(crate) sleeper: AtomicU64,
     /// Records that were overwritten before this reader came to them.
@@ -280,10 +282,7 @@ impl<'a> Ring<'a> {
 
     /// The newest record; none before the first. A writer that overwrites it at each try has none to show either.
     pub(crate) fn newest(&self) -> Option<Line> {
-        let there = |sequence: u64| match self.look(sequence) {
-            Look::There(line) => Some(line),
-            Look::NotYet | Look::Gone => None,
-        };
+        let there = |sequence: u64| if let Look::There(line) = self.look(sequence) { Some(line) } else { None };
         (0..TRIES).find_map(|_| {
             let end = self.written();
             // The last ones are left out if the writer of a replica died over them.
@@ -346,9 +345,10 @@ impl<'a> Ring<'a> {
         self.seats[seat].sleeper.store(0, Ordering::Relaxed);
     }
 
-    /// Clears what the dead reader before said. For the new owner of a seat.
-    pub(crate) fn sit_down(&self, seat: usize) {
+    /// Clears what the dead reader before said. For the new owner of a seat, a process of the module of this name.
+    pub(crate) fn sit_down(&self, seat: usize, module: u32) {
         self.awake(seat);
+        self.seats[seat].module.store(module, Ordering::Relaxed);
         self.seats[seat].passed_over.store(0, Ordering::Relaxed);
         step!("seat: awake");
         self.release(seat);

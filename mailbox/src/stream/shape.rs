@@ -263,7 +263,8 @@ const _: () = {
     assert!(size_of::<StreamPage>() <= PAGE);
     assert!(size_of::<IndexEntry>() == 64 && offset_of!(IndexEntry, len_bytes) == 40);
     assert!(offset_of!(IndexEntry, lost) == 48 && offset_of!(IndexEntry, sampled) == 56);
-    assert!(size_of::<Seat>() == 128 && offset_of!(Seat, sleeper) == 8 && offset_of!(Seat, passed_over) == 16);
+    assert!(size_of::<Seat>() == 128 && offset_of!(Seat, module) == 4);
+    assert!(offset_of!(Seat, sleeper) == 8 && offset_of!(Seat, passed_over) == 16);
 };
 
 #[cfg(test)]

@@ -184,14 +184,15 @@ impl Launch {
         self.note(note);
     }
 
-    /// Asks a module that says it is in error why, or looks whether it has answered. Never waits.
+    /// Asks a module that says it is in error why, or what it complains of, or looks whether it has answered. Never
+    /// waits.
     pub(super) fn ask_why(&mut self, index: usize) {
         let child = &mut self.children[index];
         let (asked, error) = (self.calls[index].why.take(), child.asks_why(&self.node));
         let (error, call) = match (asked, error) {
             (Some((of, call)), Some(error)) if of == error => (error, call),
             (asked, error) => {
-                // It is in error no longer, or in another one.
+                // That is over, or it is in another one.
                 asked.into_iter().for_each(|(_, call)| self.tool.link.forget(call));
                 let mut begin = || self.tool.begin(child.name(), common::STATUS, common::HASH, |_| Ok(())).ok();
                 // One that cannot be asked now is asked at the next look.
@@ -203,9 +204,10 @@ impl Launch {
         match self.tool.link.poll_for(call, |bytes| postcard::from_bytes::<Status>(bytes)) {
             None => self.calls[index].why = Some((error, call)),
             // Of this error, if it is in no later one even now.
-            Some(Ok(status)) if status.state == State::Error && child.in_error(&self.node) == Some(error) => {
+            Some(Ok(status)) if child.in_trouble(&self.node) == Some(error) => {
                 let why = if status.error.is_empty() { "it does not say why".into() } else { status.error };
-                let note = format!("{} is in error: {}", child.text(), plain::line(&why));
+                let how = if status.state == State::Error { " is in error" } else { "" };
+                let note = format!("{}{how}: {}", child.text(), plain::line(&why));
                 child.health().went_into_error(Some(error), why);
                 self.note(Some(note));
             }

@@ -92,7 +92,7 @@ impl Context {
     ) -> Self {
         let journal = clock.journal().clone();
         let publications = Publications::new(link.participant());
-        let followings = Followings::of(link.incarnation());
+        let followings = Followings::of(link.incarnation(), installation.clone());
         let named: Vec<Principal> = endpoints.iter().flat_map(|endpoint| installation.callers(*endpoint)).collect();
         let subscriptions = Subscriptions::new(&named);
         let schedule = Schedule::new(&installation, clock.unseen());

@@ -5,9 +5,13 @@ use super::subscribed::{Origin, Subscribed, seal};
 use crate::call::append;
 use crate::call::{CallError, Fault, Link, is_to};
 use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
-use rohrpost_mailbox::{Head, Name, Options};
-use rohrpost_schema::Data;
+use crate::description::noted;
+use crate::output::plain;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Head, Name, Node, Options};
+use rohrpost_schema::{Data, Type, describe_type};
 use std::marker::PhantomData;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A subscription ends by itself so long after its last renewal.
@@ -92,9 +96,17 @@ impl<T> Subscription<T> {
     }
 }
 
+/// What a program knows of the data that it subscribes to.
+pub(crate) struct WantedData {
+    pub(crate) name: &'static str,
+    pub(crate) ty: Type,
+}
+
 /// One thing that is followed.
 struct Followed {
     from: Name,
+    /// None of data that are known by their number alone.
+    wanted: Option<WantedData>,
     wish: Subscribe,
     /// Options of the request: whether only the newest counts.
     options: Options,
@@ -110,6 +122,8 @@ struct Followed {
     lost: u64,
     /// What the last refusal said, so that it is told once.
     refusal: Option<String>,
+    /// The same in the words of people, if it is one that does not pass by itself.
+    complaint: Option<String>,
 }
 
 /// All that a module follows.
@@ -118,16 +132,17 @@ pub(crate) struct Followings {
     list: Vec<Followed>,
     /// Incarnation of the module, as its requests carry it.
     incarnation: u32,
+    installation: Arc<Installation>,
 }
 
 impl Followings {
     /// Subscriptions of a module with a link of this incarnation: none yet.
-    pub(crate) fn of(incarnation: u32) -> Self {
-        Self { list: Vec::new(), incarnation }
+    pub(crate) fn of(incarnation: u32, installation: Arc<Installation>) -> Self {
+        Self { list: Vec::new(), incarnation, installation }
     }
 
     /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id, if one is
-    /// left. `latest`: there only the newest counts, and on the way as well.
+    /// left. `latest`: there only the newest counts, and on the way as well. `wanted`: what is expected.
     pub(crate) fn follow(
         &mut self,
         (mailbox, latest): (u8, bool),
@@ -135,6 +150,7 @@ impl Followings {
         number: u16,
         interface: u32,
         rate: Rate,
+        wanted: Option<WantedData>,
     ) -> Option<u16> {
         let id = u16::try_from(self.list.len()).ok()?;
         let period_us = match rate {
@@ -147,6 +163,7 @@ impl Followings {
         let options = if latest { Options::NEWEST } else { Options::default() };
         self.list.push(Followed {
             from,
+            wanted,
             wish,
             options,
             interface,
@@ -156,8 +173,14 @@ impl Followings {
             came: 0,
             lost: 0,
             refusal: None,
+            complaint: None,
         });
         Some(id)
+    }
+
+    /// A subscription that is refused for a reason that does not pass by itself.
+    pub(crate) fn complaint(&self) -> Option<&str> {
+        self.list.iter().find_map(|followed| followed.complaint.as_deref())
     }
 
     /// Packages that should have come and did not.
@@ -173,12 +196,13 @@ impl Followings {
     /// Asks for what is due, and looks at the answers. Never waits.
     pub(crate) fn renew(&mut self, link: &mut Link, now: Instant) {
         link.collect();
-        for followed in &mut self.list {
+        let Self { list, installation, .. } = self;
+        for followed in list {
             if let Some(call) = followed.call
                 && let Some(answer) = link.poll(call)
             {
                 followed.call = None;
-                followed.answered(answer, now);
+                followed.answered(answer, now, (link.participant().node(), installation));
             }
             if followed.next <= now {
                 followed.next = now + RENEW;
@@ -190,7 +214,7 @@ impl Followings {
                 let (to, options) = (followed.from, followed.options);
                 match link.begin_with(options, to, SUBSCRIBE, followed.interface, ANSWER, write) {
                     Ok(call) => followed.call = Some(call),
-                    Err(error) => followed.answered(Err(error), now),
+                    Err(error) => followed.answered(Err(error), now, (link.participant().node(), installation)),
                 }
             }
         }
@@ -255,28 +279,63 @@ impl Followed {
         self.expected = Some(sequence.wrapping_add(1));
     }
 
-    fn answered(&mut self, answer: Result<(), CallError>, now: Instant) {
-        match answer {
-            Ok(()) => self.refusal = None,
-            Err(error) => {
-                self.next = now + RETRY;
-                let text = error.to_string();
-                // A module or node that is not there yet is the usual case at the start, and not worth a warning.
-                let early = matches!(
-                    error,
-                    CallError::NotSent(_)
-                        | CallError::Timeout(..)
-                        | CallError::Fault(_, Fault::NoMailbox | Fault::NodeSilent { .. })
-                );
-                if self.refusal.as_ref() != Some(&text) {
-                    if early {
-                        tracing::debug!("subscription to data {} of {}: {text}", self.wish.number, self.from);
-                    } else {
-                        tracing::warn!("subscription to data {} of {}: {text}", self.wish.number, self.from);
-                    }
-                    self.refusal = Some(text);
-                }
+    fn answered(&mut self, answer: Result<(), CallError>, now: Instant, (node, installation): (&Node, &Installation)) {
+        let Err(error) = answer else {
+            if self.complaint.take().is_some() {
+                tracing::info!("subscription to {}: it comes again", self.what(installation));
             }
+            self.refusal = None;
+            return;
+        };
+        self.next = now + RETRY;
+        // A module or node that is not there yet is the usual case at the start, and not worth a warning.
+        let passes = matches!(
+            error,
+            CallError::NotSent(_)
+                | CallError::Timeout(..)
+                | CallError::Fault(_, Fault::NoMailbox | Fault::NodeSilent { .. })
+        );
+        let text = error.to_string();
+        if self.refusal.as_ref() == Some(&text) {
+            return;
+        }
+        // The module is named before.
+        let why = if let CallError::Fault(_, fault) = &error { fault.to_string() } else { text.clone() };
+        let told = format!("subscription to {}: {why}{}", self.what(installation), self.difference(&error, node));
+        if passes {
+            tracing::debug!("{told}");
+        } else {
+            tracing::warn!("{told}");
+            self.complaint = Some(told);
+        }
+        self.refusal = Some(text);
+    }
+
+    /// The data, as people call them.
+    fn what(&self, installation: &Installation) -> String {
+        let module = installation.classes.format(self.from);
+        match &self.wanted {
+            Some(wanted) => format!("`{}` of {module}", wanted.name),
+            None => format!("data {} of {module}", self.wish.number),
+        }
+    }
+
+    /// What differs between the data that the module has and those that are wanted, if that is known here.
+    fn difference(&self, error: &CallError, node: &Node) -> String {
+        let CallError::Fault(_, Fault::InterfaceDiffers { .. }) = error else { return String::new() };
+        let (Some(WantedData { name, ty }), Some(there)) = (&self.wanted, noted(node, self.from)) else {
+            return String::new();
+        };
+        match there.data.iter().find(|item| item.number == self.wish.number) {
+            None => format!("; it has no data of number {} any more", self.wish.number),
+            Some(item) if item.field.ty != *ty => format!(
+                "; there, number {} is `{}: {}`; this program takes `{name}: {}`",
+                self.wish.number,
+                plain::line(&item.field.name),
+                describe_type(&item.field.ty),
+                describe_type(ty)
+            ),
+            Some(_) => format!("; `{name}` itself is the same in both"),
         }
     }
 }
@@ -303,9 +362,12 @@ mod tests {
 
     #[test]
     fn only_what_was_asked_for_in_this_life_is_taken() {
-        let mut followings = Followings::of(LIFE);
+        let mut followings = Followings::of(LIFE, {
+            let text = "installation = \"test\"\nsystem = 1\n[nodes.main]\n[classes.laser]\nid = 150\n";
+            Arc::new(Installation::parse(text, std::path::Path::new("robot.toml")).unwrap())
+        });
         for (mailbox, from, number) in [(2, LASER, 1), (3, LASER, 1), (2, WHEELS, 1), (2, LASER, 2)] {
-            followings.follow((mailbox, false), from, number, 77, Rate::Each).unwrap();
+            followings.follow((mailbox, false), from, number, 77, Rate::Each, None).unwrap();
         }
         let mut followed = 0;
         for (id, mailbox, from, number, incarnation, taken, why) in [

@@ -21,6 +21,8 @@ pub(crate) struct Incarnation<M> {
     pub(super) participant: Arc<Participant>,
     pub(super) state: ModuleState,
     error: String,
+    /// What does not work although it is on; empty: all does.
+    complaint: String,
     started: Instant,
     /// A part of the module's code that took so long is told.
     busy_after: Duration,
@@ -29,7 +31,16 @@ pub(crate) struct Incarnation<M> {
 impl<M: MadeModule> Incarnation<M> {
     pub(crate) fn new(module: M, participant: Arc<Participant>, busy_after: Duration) -> Self {
         let (state, started) = (ModuleState::Starting, Instant::now());
-        let mut life = Self { module, changes: 0, participant, state, error: String::new(), started, busy_after };
+        let mut life = Self {
+            module,
+            changes: 0,
+            participant,
+            state,
+            error: String::new(),
+            complaint: String::new(),
+            started,
+            busy_after,
+        };
         life.enter(ModuleState::Off);
         life
     }
@@ -66,6 +77,15 @@ impl<M: MadeModule> Incarnation<M> {
     pub(super) fn enter(&mut self, state: ModuleState) {
         self.state = state;
         self.participant.set_state(state);
+    }
+
+    /// Takes what does not work although it is on, for tools and launch to see.
+    pub(super) fn complains(&mut self, complaint: Option<&str>) {
+        let complaint = complaint.unwrap_or_default();
+        if self.complaint != complaint {
+            self.complaint = complaint.into();
+            self.participant.set_complaint(!complaint.is_empty());
+        }
     }
 
     pub(crate) fn require_on(&self) -> Result<(), Fault> {
@@ -132,7 +152,7 @@ impl<M: MadeModule> Incarnation<M> {
     pub(crate) fn status(&self, context: &Context) -> Status {
         Status {
             state: self.state.into(),
-            error: self.error.clone(),
+            error: if self.error.is_empty() { &self.complaint } else { &self.error }.clone(),
             incarnation: self.participant.incarnation(),
             uptime_ms: self.started.elapsed().as_millis() as u64,
             subscribers: context.subscriptions.len() as u32,

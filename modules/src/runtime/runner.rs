@@ -136,6 +136,8 @@ impl<M: MadeModule> Running<M> {
         self.context.link.unseen().borrow_mut().collect();
         if self.life.state == ModuleState::On {
             self.context.followings.renew(&mut self.context.link.unseen().borrow_mut(), Instant::now());
+            let Context { followings, followed_streams, .. } = &self.context;
+            self.life.complains(followings.complaint().or_else(|| followed_streams.complaint()));
         }
         let moment = self.context.deliver_due();
         if self.life.state == ModuleState::On && self.context.schedule.take_tick(moment) {

@@ -188,7 +188,7 @@ pub(crate) fn a_dead_holder_costs_nothing() {
     let next = {
         let stream = stream.clone();
         thread::spawn(move || {
-            stream.ring().sit_down(0);
+            stream.ring().sit_down(0, 0);
             stream.read(0, &lines[1], Bytes::Plain);
         })
     };
@@ -270,7 +270,7 @@ pub(crate) fn a_dead_sleeper_is_forgotten_alone() {
     let next = {
         let stream = stream.clone();
         thread::spawn(move || {
-            stream.ring().sit_down(0);
+            stream.ring().sit_down(0, 0);
             stream.ring().drowsy(0, 8);
         })
     };

@@ -117,7 +117,7 @@ impl Reader {
     /// Takes the seat of a reader that is gone.
     fn new(stream: &'static Stream, seat: usize) -> Self {
         let ring = stream.ring();
-        ring.sit_down(seat);
+        ring.sit_down(seat, 0);
         Self { stream, seat, began: ring.written(), next: ring.written(), read: 0, lost: 0 }
     }
 

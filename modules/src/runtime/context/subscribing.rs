@@ -5,7 +5,7 @@ use crate::common::DataHead;
 use crate::interface::DataPort;
 use crate::journal::{Question, Tag, nanoseconds};
 use crate::runtime::error::ContextError;
-use crate::runtime::follow::{Rate, Subscription};
+use crate::runtime::follow::{Rate, Subscription, WantedData};
 use rohrpost_mailbox::{CreateError, Head, Name, OverflowPolicy, Shape, local};
 use rohrpost_schema::Data;
 
@@ -58,7 +58,8 @@ impl Context {
         rate: Rate,
     ) -> Result<Subscription<T>, ContextError> {
         let from = self.named(module, port.class)?;
-        self.follow(mailbox, from, port.number, (port.hash)(), rate)
+        let wanted = WantedData { name: port.name, ty: T::schema() };
+        self.follow(mailbox, from, port.number, (port.hash)(), rate, Some(wanted))
     }
 
     /// Subscribes to data of a type that is known by its description alone. They come to `mailbox`: [`local::DATA`], or
@@ -88,7 +89,7 @@ impl Context {
         interface: u32,
         rate: Rate,
     ) -> Result<Subscription<()>, ContextError> {
-        self.follow(mailbox, from, number, interface, rate)
+        self.follow(mailbox, from, number, interface, rate, None)
     }
 
     fn follow<T>(
@@ -98,6 +99,7 @@ impl Context {
         number: u16,
         interface: u32,
         rate: Rate,
+        wanted: Option<WantedData>,
     ) -> Result<Subscription<T>, ContextError> {
         let known = self.taking.iter().copied().find(|(local, _)| *local == mailbox);
         let (mailbox, latest) = known.ok_or(ContextError::NoMailbox(mailbox))?;
@@ -106,7 +108,7 @@ impl Context {
             Rate::Every(period) => Some(nanoseconds(period)),
         };
         self.journal.asked(Tag::Subscribed, Question::Data { from: from.raw(), number, interface, mailbox, period_ns });
-        let followed = self.followings.follow((mailbox, latest), from, number, interface, rate);
+        let followed = self.followings.follow((mailbox, latest), from, number, interface, rate, wanted);
         Ok(Subscription::new(followed.ok_or(ContextError::TooMany)?, mailbox))
     }
 

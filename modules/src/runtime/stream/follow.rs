@@ -186,6 +186,11 @@ impl FollowedStreams {
         self.tallies().map(|(_, _, _, lost)| lost).sum()
     }
 
+    /// A stream of which the last records could not be read.
+    pub(in crate::runtime) fn complaint(&self) -> Option<&str> {
+        self.list.iter().find_map(|stream| stream.notices.refusal.as_deref())
+    }
+
     /// When one that could not be read is tried again.
     pub(in crate::runtime) fn retry(&self) -> Option<Instant> {
         self.list.iter().filter_map(|stream| stream.notices.retry).min()
