@@ -246,6 +246,11 @@ impl Node {
         &self.directory
     }
 
+    /// Device and number of its file `node`.
+    pub(crate) fn identity(&self) -> (u64, u64) {
+        self.identity
+    }
+
     pub(crate) fn page(&self) -> &NodePage {
         &self.page
     }
@@ -311,8 +316,9 @@ impl Node {
     /// in order, or another has taken its place in the table.
     pub fn last_word_of(&self, module: Name, pid: u32) -> Option<ParticipantInfo> {
         let all = self.page().entries.iter().map(Entry::read);
-        // An earlier process may have had the number.
-        all.filter(|p| p.module == module && p.pid == pid).max_by_key(|p| p.joined_ns)
+        let its = all.filter(|p| p.module == module && p.pid == pid);
+        // An earlier process may have had the number. Not by times: the clock began anew with the computer.
+        its.reduce(|last, next| if next.joined_after(last.incarnation) { next } else { last })
     }
 
     /// The state in it.

@@ -30,7 +30,7 @@ mod repeats;
 mod serve;
 mod start;
 
-pub use error::LaunchError;
+pub use error::{LaunchError, NotStarted};
 pub use events::{Event, events};
 pub use leftovers::CONFIG_FILE;
 
