@@ -12,12 +12,13 @@
 
 use crate::entry::ParticipantInfo;
 use crate::node::Node;
+use crate::sys::family::{has_ended, pidfd};
 use nix::errno::Errno;
-use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::poll::PollTimeout;
 use nix::sys::signal::Signal;
 use std::fs;
 use std::io;
-use std::os::fd::{AsFd, AsRawFd, FromRawFd, OwnedFd, RawFd};
+use std::os::fd::{AsRawFd, OwnedFd};
 use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
 
@@ -72,16 +73,7 @@ impl Node {
 impl ParticipantProcess {
     /// The process of this number in our pid namespace, whichever it is; none when there is none.
     fn open(pid: u32) -> io::Result<Option<Self>> {
-        let Ok(number) = libc::pid_t::try_from(pid) else { return Ok(None) };
-        // SAFETY: takes numbers only.
-        let opened = Errno::result(unsafe { libc::syscall(libc::SYS_pidfd_open, number, 0) });
-        let pidfd = match opened {
-            // SAFETY: the kernel has just made it for us, and nobody else knows it.
-            Ok(made) => unsafe { OwnedFd::from_raw_fd(made as RawFd) },
-            // None, or a thread's.
-            Err(Errno::ESRCH | Errno::EINVAL | Errno::ENOENT) => return Ok(None),
-            Err(error) => return Err(error.into()),
-        };
+        let Some(pidfd) = pidfd(pid)? else { return Ok(None) };
         // The /proc that is mounted may be that of another namespace, in which the process has another number, or none.
         let told = fs::read_to_string(format!("/proc/self/fdinfo/{}", pidfd.as_raw_fd()))?;
         let number = told.lines().find_map(|line| line.strip_prefix("Pid:")?.trim().parse::<u32>().ok());
@@ -121,8 +113,7 @@ impl ParticipantProcess {
 
     /// Whether it has ended, also if its parent has not noticed yet.
     pub fn has_ended(&self) -> bool {
-        let mut waited = [PollFd::new(self.pidfd.as_fd(), PollFlags::POLLIN)];
-        poll(&mut waited, PollTimeout::ZERO).is_ok_and(|ready| ready > 0)
+        has_ended(&self.pidfd, PollTimeout::ZERO)
     }
 
     /// Whether it was started with a variable of this name in its environment.

@@ -91,3 +91,4 @@ mod top;
 mod tuned;
 mod versions;
 mod wifi;
+mod wrapped;

@@ -81,6 +81,21 @@ fn a_launch_ends_nobody_in_another_container_and_nobody_here_with_the_same_numbe
 }
 
 #[test]
+fn the_last_word_of_a_dead_module_is_not_that_of_a_new_one_with_the_same_number() {
+    let place = Place::new();
+    let config = place.config(&[&probe("probe.0", "", "")]);
+    let Some(mut first) = contained(&place, "exec \"$@\"", &config) else { return };
+    let robot = launched_in(&mut first, &place, &config);
+    drop(first);
+    wait("all in it have ended", || robot.node.participants().is_empty().then_some(()));
+    let keys = "ready-within = \"500 ms\"\nrestart = \"never\"\nrequired = true";
+    let config = place.config(&[&probe("probe.0", "hang-at-start = true", keys)]);
+    let mut second = contained(&place, "exec \"$@\"", &config).unwrap();
+    assert!(!second.end().success());
+    assert!(second.err().contains("probe.0 was not ready within 500ms; killed"), "{}", second.err());
+}
+
+#[test]
 fn a_module_that_was_started_by_hand_is_left_alone_and_named() {
     let place = Place::new();
     let config = place.config(&[OUTPUT, &probe("probe.0", "", "")]);
