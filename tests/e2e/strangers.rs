@@ -54,6 +54,9 @@ fn a_launch_ends_nobody_in_another_container_and_nobody_here_with_the_same_numbe
     let Some(mut first) = contained(&place, "\"$@\" & exec sleep 600", &config) else { return };
     let robot = launched_in(&mut first, &place, &config);
     let before = use_of(&robot, "probe.0");
+    // Nor is the process of its number out here taken for the module.
+    let listed = place.say(&["list", "--json"]).json();
+    assert_eq!(listed["modules"][0]["scheduling"], "-", "{listed}");
     named(&first, "rohrpost").iter().for_each(|launch| signal(*launch, Signal::SIGKILL));
     wait("its launch is dead", || robot.node.launcher().is_none().then_some(()));
     // In the second container each number up to the module's is that of a process that has nothing to do with it.

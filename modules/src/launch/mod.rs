@@ -303,7 +303,7 @@ impl Launch {
     /// When its directory cannot be read.
     pub fn survey(&self) -> Result<Survey, NodeError> {
         let mut survey = Survey::new(&self.node, &self.installation, &self.node_name)?;
-        survey.ask_kernel();
+        survey.ask_kernel(&self.node);
         Ok(survey)
     }
 
