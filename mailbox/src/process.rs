@@ -149,7 +149,7 @@ impl ParticipantProcess {
 }
 
 /// Whether this line of an `fdinfo` is a lock on this byte of a file of this number, held by the open file:
-/// `lock:	1: OFDLCK  ADVISORY  WRITE -1 00:1a:4711 3 3`.
+/// `lock: 1: OFDLCK  ADVISORY  WRITE -1 00:1a:4711 3 3`.
 fn is_lock_on(line: &str, inode: u64, byte: u64) -> bool {
     let fields: Vec<&str> = line.split_whitespace().collect();
     let ["lock:", _, "OFDLCK", _, "WRITE", _, file, first, last] = fields[..] else { return false };

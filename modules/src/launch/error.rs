@@ -53,9 +53,7 @@ pub enum LaunchError {
 #[derive(Debug, thiserror::Error)]
 pub enum NotStarted {
     /// It is not known which process it is.
-    #[error(
-        "{0}; end it where it runs, or launch under another ROHRPOST_DIR, or another `installation` in the configuration"
-    )]
+    #[error("{0}; end it where it runs, or launch under another ROHRPOST_DIR, or another `installation`")]
     Unknown(ProcessError),
     /// Somebody has started it.
     #[error("this one was started by hand: end it (kill {0}), and launch again")]

@@ -1,4 +1,5 @@
-//! Processes whose parent has ended: as process 1 of a container, or as a child subreaper, launch is their parent then.
+//! Orphans: a process that loses its parent gets launch as one, if launch is process 1 of a container, or a child
+//! subreaper.
 
 use nix::sys::prctl::get_child_subreaper;
 use nix::sys::wait::{WaitPidFlag, waitpid};

@@ -87,8 +87,8 @@ pub enum StartError {
     Exact(#[from] RunError),
     /// Launch is gone, or out of sight.
     #[error(
-        "launch, process {0}, ended before this module began, or is no ancestor of this process: a program between them \
-         must wait for it (no `&`, no daemon, no pid namespace), or best become it (`exec`)"
+        "launch, process {0}, ended before this module began, or is no ancestor of this process: a program between \
+         them must wait for it (no `&`, no daemon, no pid namespace), or best become it (`exec`)"
     )]
     Orphan(u32),
     /// The module said no.
