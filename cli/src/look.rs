@@ -33,7 +33,7 @@ impl Running {
         let look = |node: &&str| {
             if *node == self.node_name {
                 let mut survey = Survey::within(scope, &self.node, &self.installation, node)?;
-                survey.ask_kernel();
+                survey.ask_kernel(&self.node);
                 return Ok(Ok(survey));
             }
             Ok(match seen.next() {

@@ -96,6 +96,14 @@ pub struct ParticipantInfo {
     pub in_hand: Option<InHand>,
 }
 
+impl ParticipantInfo {
+    /// Whether it joined after the node gave out this incarnation.
+    pub fn joined_after(&self, incarnation: u32) -> bool {
+        // They wrap.
+        self.incarnation.wrapping_sub(incarnation).cast_signed() > 0
+    }
+}
+
 impl Entry {
     pub(crate) fn bell(&self) -> Bell<'_> {
         Bell { rings: &self.bell, polling: &self.polling }

@@ -62,7 +62,7 @@
 //! 2. `bell`, `doorbell`, `waiting`, `watch`: sleeping and waking.
 //! 3. `layout`, `segment`, `memory`: the bytes, and the only addresses. `sync`: atomics and fences.
 //! 4. `label`, `sender`, `send_error`, `place`, `receiver`: what users hold; `routes`: what is on other nodes.
-//!    `node`, `entry`, `participant`, `lock`, `registry`, `unlink`: live processes and their names.
+//!    `node`, `entry`, `participant`, `lock`, `process`, `registry`, `unlink`: live processes and their names.
 //! 5. `stream`: rings of stamped records. `owned`: what their files and those of mailboxes have in common.
 //! 6. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
 //!
@@ -111,6 +111,7 @@ mod owned;
 mod package;
 mod participant;
 mod place;
+mod process;
 mod queue;
 mod receiver;
 mod registry;
@@ -148,6 +149,7 @@ pub use node::{LaunchLock, Node, NodeError, base_directory, node_directory, remo
 pub use owned::BadFile;
 pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
 pub use participant::Participant;
+pub use process::{ParticipantProcess, ProcessError};
 pub use receiver::{Package, Receiver};
 pub use registry::CreateError;
 pub use routes::ROUTES_MAX;

@@ -18,7 +18,7 @@
 //! file `node`: the kernel drops that lock with the process, whatever killed it.
 
 use crate::doorbell;
-use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
+use crate::entry::{Entry, PARTICIPANTS_MAX, ParticipantInfo};
 use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, AllHeld, Held};
@@ -246,6 +246,11 @@ impl Node {
         &self.directory
     }
 
+    /// Device and number of its file `node`.
+    pub(crate) fn identity(&self) -> (u64, u64) {
+        self.identity
+    }
+
     pub(crate) fn page(&self) -> &NodePage {
         &self.page
     }
@@ -310,14 +315,9 @@ impl Node {
     /// The last that this process said of what it does as this module, also if it has died since; none when it has left
     /// in order, or another has taken its place in the table.
     pub fn last_word_of(&self, module: Name, pid: u32) -> Option<ParticipantInfo> {
-        let all = self.page().entries.iter().map(Entry::read);
-        // An earlier process may have had the number.
-        all.filter(|p| p.module == module && p.pid == pid).max_by_key(|p| p.joined_ns)
-    }
-
-    /// The state in it.
-    pub fn state_of(&self, module: Name, pid: u32) -> Option<ModuleState> {
-        self.last_word_of(module, pid)?.state
+        // An earlier process may have had the number; perhaps before the computer, and its clock, began anew.
+        let its = self.page().entries.iter().map(Entry::read).filter(|p| p.module == module && p.pid == pid);
+        its.reduce(|last, next| if next.joined_after(last.incarnation) { next } else { last })
     }
 
     /// Process id of the launch that runs this node now.

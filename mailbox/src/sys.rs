@@ -1,5 +1,9 @@
-//! What the kernel is asked for a process: its scheduling, its memory, a device for IP packets. A refusal is told, not
-//! fatal.
+//! What the kernel is asked for a process: its scheduling, its memory, its kin, a device for IP packets. A refusal is
+//! told, not fatal.
+
+pub(crate) mod family;
+
+pub use family::{Ancestor, descends_from, ended_child};
 
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use nix::sys::mman::{MlockAllFlags, mlockall};
@@ -162,6 +166,15 @@ pub fn lock_memory() -> io::Result<bool> {
     }
     mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE)?;
     Ok(true)
+}
+
+/// Whether this process ignores a signal: it was started so, as by `nohup`, or has chosen to.
+pub fn ignores(signal: i32) -> bool {
+    // SAFETY: numbers and addresses, for which zero is a value.
+    let mut now: libc::sigaction = unsafe { std::mem::zeroed() };
+    // SAFETY: changes nothing, and writes to `now`, which lives here.
+    let told = check(unsafe { libc::sigaction(signal, std::ptr::null(), &raw mut now) });
+    told.is_ok() && now.sa_sigaction == libc::SIG_IGN
 }
 
 /// Room of a file system, bytes.

@@ -29,7 +29,7 @@ use rohrpost_config::{Installation, ROUTER, TCP};
 use rohrpost_mailbox::sys::{Scheduling, scheduling_of};
 use rohrpost_mailbox::{
     ClassTraffic, FlowInfo, InspectError, Latency, Loss, MailboxDetail, MailboxInfo, Name, Node, NodeError,
-    ParticipantInfo, SlotInfo, local, monotonic_ns, saturating_sum,
+    ParticipantInfo, ProcessError, SlotInfo, local, monotonic_ns, saturating_sum,
 };
 
 /// A node at one moment.
@@ -204,9 +204,12 @@ impl Survey {
         all
     }
 
-    /// Asks the kernel what the processes take and how they are scheduled. On their own computer alone: elsewhere the
-    /// numbers of processes mean others.
-    pub fn ask_kernel(&mut self) {
+    /// Asks the kernel what the processes of this node take and how they are scheduled. On another computer, and in
+    /// another pid namespace, their numbers mean others, so it is not asked.
+    pub fn ask_kernel(&mut self, node: &Node) {
+        if !are_here(node, self.modules.iter().filter_map(|module| module.process.as_ref())) {
+            return;
+        }
         for module in &mut self.modules {
             let pid = module.process.as_ref().map(|process| process.pid);
             module.usage = pid.and_then(Usage::of);
@@ -356,8 +359,20 @@ impl MailboxSnapshot {
         let mut stopped: Vec<u32> = parties.filter_map(|party| party.pid).filter(|pid| is_stopped(*pid)).collect();
         stopped.sort_unstable();
         stopped.dedup();
+        stopped.retain(|pid| are_here(node, node.participants().iter().filter(|there| there.pid == *pid)));
         Ok(Self { detail, stopped })
     }
+}
+
+/// Whether the numbers of these processes mean them here, too: not if they run in another pid namespace. The first that
+/// the kernel tells of speaks for all.
+fn are_here<'a>(node: &Node, mut processes: impl Iterator<Item = &'a ParticipantInfo>) -> bool {
+    let told = processes.find_map(|process| match node.process_of(process) {
+        Ok(Some(_)) => Some(true),
+        Err(ProcessError::Elsewhere) => Some(false),
+        Ok(None) | Err(ProcessError::Untold(_)) => None,
+    });
+    told.unwrap_or(true)
 }
 
 /// Whether a process stands: the letter after its name, which may hold anything, says so.

@@ -331,7 +331,7 @@ fn what_is_off_comes_back_off_however_it_ended() {
         watch_until(&mut launch, |launch| {
             launch.phase(name) == Some(Phase::Running) && pid(launch, 0).is_some_and(|pid| pid != before)
         });
-        let state = node.state_of(name, pid(&mut launch, 0).unwrap());
+        let state = node.last_word_of(name, pid(&mut launch, 0).unwrap()).unwrap().state;
         assert_eq!(state, Some(ModuleState::Off), "start = {start}, restart was asked for: {asked}");
         person.close();
         launch.stop();

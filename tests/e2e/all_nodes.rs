@@ -41,7 +41,7 @@ fn wait_until_both_run(launch: &mut Running) {
 }
 
 /// Processes that a process has started, recursively.
-fn below(pid: u32) -> Vec<u32> {
+pub(crate) fn below(pid: u32) -> Vec<u32> {
     let text = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap_or_default();
     let children: Vec<u32> = text.split_whitespace().filter_map(|pid| pid.parse().ok()).collect();
     children.iter().flat_map(|pid| std::iter::once(*pid).chain(below(*pid))).collect()

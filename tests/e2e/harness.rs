@@ -295,7 +295,8 @@ impl Drop for Place {
         for entry in std::fs::read_dir(self.memory()).into_iter().flatten().flatten() {
             let Ok(node) = Node::open(&entry.path()) else { continue };
             for left in node.participants().iter().filter(|left| left.pid != std::process::id()) {
-                let _ = kill(Pid::from_raw(left.pid as i32), Signal::SIGKILL);
+                // The number of one in another pid namespace is a stranger's here.
+                let _ = node.process_of(left).ok().flatten().map(|process| process.kill());
             }
         }
     }

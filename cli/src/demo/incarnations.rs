@@ -1,11 +1,9 @@
 //! The incarnations of routers: which one died, when, and when the next was ready.
 
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
 use rohrpost::Name;
 use rohrpost::common::State;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Node, NodeError, monotonic_ns, node_directory};
+use rohrpost_mailbox::{Node, NodeError, ParticipantProcess, monotonic_ns, node_directory};
 use std::sync::Arc;
 
 /// A router that died.
@@ -28,7 +26,7 @@ struct WatchedNode {
     node: Arc<Node>,
     router: Name,
     /// The process that is ready; none until there is one.
-    pid: Option<u32>,
+    process: Option<ParticipantProcess>,
 }
 
 /// Watches routers, at most one of each node, in the tables of the nodes' shared memory: it sends nothing.
@@ -43,7 +41,7 @@ impl Incarnations {
         let watched = |(index, config): (usize, &rohrpost_config::Node)| {
             let router = router(&config.name)?;
             let node = Node::open(&node_directory(&installation.name, &config.name));
-            Some(node.map(|node| WatchedNode { index, node, router, pid: None }))
+            Some(node.map(|node| WatchedNode { index, node, router, process: None }))
         };
         let nodes: Result<Vec<WatchedNode>, NodeError> =
             installation.nodes.iter().enumerate().filter_map(watched).collect();
@@ -56,17 +54,18 @@ impl Incarnations {
     pub(super) fn look(&mut self) {
         for watched in &mut self.nodes {
             let index = watched.index;
-            match watched.pid {
-                Some(pid) if !is_alive(pid) => {
-                    watched.pid = None;
+            match &watched.process {
+                Some(process) if process.has_ended() => {
+                    let pid = process.pid();
+                    watched.process = None;
                     self.deaths.push(Death { node: index, pid, at_ns: monotonic_ns(), again: None });
                 }
                 Some(_) => {}
                 None => {
-                    watched.pid = watched.ready().filter(|pid| is_alive(*pid));
+                    watched.process = watched.ready().filter(|process| !process.has_ended());
                     let last = self.deaths.iter_mut().rev().find(|death| death.node == index);
-                    if let (Some(pid), Some(death)) = (watched.pid, last) {
-                        death.again = Some((pid, monotonic_ns()));
+                    if let (Some(process), Some(death)) = (&watched.process, last) {
+                        death.again = Some((process.pid(), monotonic_ns()));
                     }
                 }
             }
@@ -75,26 +74,18 @@ impl Incarnations {
 
     /// Kills the router of a node, as a crash would.
     pub(super) fn kill(&self, node: usize) -> Option<u32> {
-        let pid = self.nodes.iter().find(|watched| watched.index == node)?.pid?;
-        // Found alive a moment ago; process ids are not reused so soon.
-        kill(Pid::from_raw(pid.cast_signed()), Signal::SIGKILL).ok().map(|()| pid)
+        let process = self.nodes.iter().find(|watched| watched.index == node)?.process.as_ref()?;
+        process.kill().ok().map(|()| process.pid())
     }
 }
 
 impl WatchedNode {
-    /// The process id of the present router, if it is ready.
-    fn ready(&self) -> Option<u32> {
+    /// The process of the present router, if it is ready.
+    fn ready(&self) -> Option<ParticipantProcess> {
         let all = self.node.participants();
         let is_ready = |state: State| !matches!(state, State::Starting | State::Stopping);
         let mut routers = all.into_iter().filter(|participant| participant.module == self.router);
-        routers.find(|router| router.state.is_some_and(|state| is_ready(state.into()))).map(|router| router.pid)
+        let router = routers.find(|router| router.state.is_some_and(|state| is_ready(state.into())))?;
+        self.node.process_of(&router).ok().flatten()
     }
-}
-
-/// A zombie counts as dead, too: it has ended, and its parent has not noticed yet.
-fn is_alive(pid: u32) -> bool {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    // The name before it may contain anything, also brackets.
-    let state = stat.rsplit(") ").next().and_then(|rest| rest.chars().next());
-    state.is_some_and(|state| !matches!(state, 'Z' | 'X'))
 }

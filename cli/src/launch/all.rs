@@ -14,7 +14,7 @@ use crate::speech::Speech;
 use crate::terminal::Failure;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::{Pid, getppid};
-use rohrpost::launch::{Event, events};
+use rohrpost::launch::{Event, events, reap_orphans};
 use rohrpost_config::{Installation, Reach};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
@@ -219,6 +219,8 @@ impl<'a> LaunchedNodes<'a> {
                 self.speech.complain(&format!("node {} {how}: {status}", node.name));
             }
         }
+        let is_own = |ended| self.nodes.iter().any(|node| node.ended.is_none() && node.child.id() == ended);
+        reap_orphans(is_own);
     }
 
     /// Stops all nodes, the last first; all at once on a second stop request. A node that failed sets the exit code.

@@ -3,6 +3,8 @@
 
 mod ended;
 mod ending;
+mod heard;
+mod process;
 
 pub(super) use ending::Then;
 
@@ -11,15 +13,14 @@ use super::policy::{Policy, STEADY};
 use super::printed::Printed;
 use super::program::Program;
 use super::repeats::Repeats;
-use crate::common::OutputLevel;
 use crate::launcher::{ChildState, Phase};
 use crate::output::Relay;
 use ending::ChildShutdown;
-use nix::sys::signal::Signal;
+use process::ModuleProcess;
 use rohrpost_config::{Installation, Module, Start};
 use rohrpost_mailbox::{ModuleState, Name, Node};
 use std::io;
-use std::process::{Child as Process, ExitStatus};
+use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
 /// While a module starts it is looked after so often, and when it has ended, until all that it printed is there.
@@ -74,7 +75,7 @@ pub(super) struct Child {
     ready_within: Duration,
     stop_within: Duration,
     phase: Phase,
-    process: Option<Process>,
+    process: Option<ModuleProcess>,
     mailboxes: Mailboxes,
     /// Its process has ended so, then; what it printed last may still come.
     over: Option<(ExitStatus, Instant)>,
@@ -169,7 +170,12 @@ impl Child {
 
     /// Its process, while there is one.
     pub(super) fn pid(&self) -> Option<u32> {
-        self.process.as_ref().map(std::process::Child::id)
+        self.process.as_ref().map(ModuleProcess::pid)
+    }
+
+    /// The process that launch has started for it, and has to ask for its end.
+    pub(super) fn started(&self) -> Option<u32> {
+        self.process.as_ref().map(ModuleProcess::started)
     }
 
     /// Why it is in error now, if it is.
@@ -235,8 +241,8 @@ impl Child {
 
     /// Starts the process; what there is to say if that fails. That is an end without success: the program may be
     /// replaced just now, or the computer be short of something for moments.
-    pub(super) fn spawn(&mut self, now: Instant) -> Option<String> {
-        match self.try_spawn(now) {
+    pub(super) fn spawn(&mut self, node: &Node, now: Instant) -> Option<String> {
+        match self.try_spawn(node, now) {
             Ok(process) => {
                 self.process = Some(process);
                 self.phase = Phase::Starting;
@@ -255,13 +261,15 @@ impl Child {
         }
     }
 
-    fn try_spawn(&mut self, now: Instant) -> io::Result<Process> {
+    fn try_spawn(&mut self, node: &Node, now: Instant) -> io::Result<ModuleProcess> {
         // First: if nobody reads what it prints, a process is stuck as soon as the pipe is full.
         let quiet = self.repeats.is_quiet().then_some(STEADY);
         let pipes = self.printed.begin(quiet.map(|quiet| now + quiet))?;
         // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes
         // before any word of launch's: so it switches itself on. At the first start launch does, when all are ready.
-        self.program.spawn(self.lives > 0 && self.turn_on, self.restarts, quiet, pipes)
+        let before = node.next_incarnation();
+        let started = self.program.spawn(self.lives > 0 && self.turn_on, self.restarts, quiet, pipes)?;
+        Ok(ModuleProcess::new(self.name, started, before))
     }
 
     /// Looks after it; what there is to say.
@@ -269,7 +277,8 @@ impl Child {
         self.printed.attend(now);
         self.note_switch(node);
         if let Some(process) = &mut self.process {
-            match process.try_wait() {
+            process.find_module(node);
+            match process.end() {
                 Ok(Some(status)) => {
                     self.process = None;
                     self.over = Some((status, now));
@@ -291,12 +300,12 @@ impl Child {
             Phase::Starting if self.state_of(node).is_some_and(is_ready) => self.phase = Phase::Ready,
             Phase::Starting if now - self.since > self.ready_within => {
                 let within = self.ready_within;
-                self.kill(Signal::SIGKILL);
+                self.process.iter().for_each(ModuleProcess::kill);
                 // For its end, and then as its policy has it.
                 self.phase = Phase::Waiting;
                 return Some(format!("{} was not ready within {within:?}; killed", self.text));
             }
-            Phase::Waiting if self.may_spawn(now) => return self.spawn(now),
+            Phase::Waiting if self.may_spawn(now) => return self.spawn(node, now),
             Phase::Stopping => return self.press(now),
             Phase::Ready | Phase::Running => return self.note_busy(node, now),
             _ => {}
@@ -304,44 +313,9 @@ impl Child {
         None
     }
 
-    /// What its process says of itself in the node's table.
-    fn state_of(&self, node: &Node) -> Option<ModuleState> {
-        node.state_of(self.name, self.process.as_ref()?.id())
-    }
-
-    /// Times that it went into error, as it says itself.
-    pub(super) fn errors(&self, node: &Node) -> u32 {
-        let word = self.process.as_ref().and_then(|process| node.last_word_of(self.name, process.id()));
-        word.map_or(0, |word| word.errors)
-    }
-
-    /// The number of the error that it says it is in.
-    pub(super) fn in_error(&self, node: &Node) -> Option<u32> {
-        let word = node.last_word_of(self.name, self.process.as_ref()?.id())?;
-        (word.state == Some(ModuleState::Error)).then_some(word.errors)
-    }
-
-    /// The same, if why is not known yet.
-    pub(super) fn asks_why(&mut self, node: &Node) -> Option<u32> {
-        let in_error = self.in_error(node);
-        self.health.asks_why(in_error)
-    }
-
     /// What went wrong with it, and what it is stuck in.
     pub(super) fn health(&mut self) -> &mut Health {
         &mut self.health
-    }
-
-    /// Looks whether a part of its own code has not come back for long.
-    fn note_busy(&mut self, node: &Node, now: Instant) -> Option<String> {
-        let word = node.last_word_of(self.name, self.process.as_ref()?.id())?;
-        let working = self.health.look(word.in_hand, now)?;
-        let told = format!(
-            "is busy: {}; until that comes back it hears nobody, and what is sent to it waits or is lost",
-            working.told(node, &self.names)
-        );
-        self.printed.say(OutputLevel::Warn, &told, None);
-        Some(format!("{} {told}", self.text))
     }
 
     fn may_spawn(&self, now: Instant) -> bool {

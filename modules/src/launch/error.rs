@@ -1,7 +1,7 @@
 //! Why a node could not be launched.
 
 use crate::runtime::ClientError;
-use rohrpost_mailbox::NodeError;
+use rohrpost_mailbox::{NodeError, ProcessError};
 
 /// Why a node could not be launched.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +27,16 @@ pub enum LaunchError {
     /// A module of an earlier launch.
     #[error("module {0} of an earlier launch, process {1}, cannot be killed; end it by hand (is it another user's?)")]
     Leftover(String, u32),
+    /// A process that has the name of a module, and that launch must not end.
+    #[error("module {module} runs already, as process {pid}; launch ends only what a launch has started, and {why}")]
+    NotStarted {
+        /// The module.
+        module: String,
+        /// The number of the process in its own pid namespace.
+        pid: u32,
+        /// Why it is left alone.
+        why: NotStarted,
+    },
     /// A module that would not start.
     #[error("module {module} did not become ready: {why}{}", below(notes))]
     NotReady {
@@ -37,6 +47,17 @@ pub enum LaunchError {
         /// What else there is to say: of its earlier tries, of the others, and of their end.
         notes: Vec<String>,
     },
+}
+
+/// Why launch leaves a process alone that has the name of one of its modules.
+#[derive(Debug, thiserror::Error)]
+pub enum NotStarted {
+    /// It is not known which process it is.
+    #[error("{0}; end it where it runs, or launch under another ROHRPOST_DIR, or another `installation`")]
+    Unknown(ProcessError),
+    /// Somebody has started it.
+    #[error("this one was started by hand: end it (kill {0}), and launch again")]
+    ByHand(u32),
 }
 
 /// Each note on a line of its own, below what was said before.

@@ -1,6 +1,7 @@
 //! What wakes launch: signals, or its caller.
 
 use super::LaunchError;
+use crate::runtime::stop_signals;
 use rohrpost_mailbox::Participant;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::Receiver;
@@ -14,15 +15,15 @@ pub enum Event {
     Child,
 }
 
-/// A channel of events: SIGINT, SIGTERM and SIGHUP (a terminal was closed) say stop, SIGCHLD that a child may have
-/// ended.
+/// A channel of events: SIGINT, SIGTERM and SIGHUP (a terminal was closed; not under `nohup`) say stop, SIGCHLD that a
+/// child may have ended.
 ///
 /// # Errors
 /// [`LaunchError::Signals`].
 pub fn events() -> Result<Receiver<Event>, LaunchError> {
-    use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
-    let mut signals =
-        signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP, SIGCHLD]).map_err(LaunchError::Signals)?;
+    use signal_hook::consts::SIGCHLD;
+    let heard = stop_signals().chain([SIGCHLD]);
+    let mut signals = signal_hook::iterator::Signals::new(heard).map_err(LaunchError::Signals)?;
     let (sender, receiver) = std::sync::mpsc::channel();
     let forward = move || {
         for signal in signals.forever() {

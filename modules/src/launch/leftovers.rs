@@ -1,53 +1,46 @@
 //! What an earlier launch left behind.
 
 use super::LaunchError;
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
+use super::error::NotStarted;
+use crate::runtime::environment;
 use rohrpost_config::{Installation, Module};
-use rohrpost_mailbox::{Node, NodeError};
+use rohrpost_mailbox::{Node, NodeError, ParticipantInfo, ParticipantProcess, ProcessError};
 use std::fs;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A process that was killed ends within this time, or never (it waits for a broken disk, say).
 pub(super) const KILL_TIME: Duration = Duration::from_secs(5);
+/// Between two looks at what is still there.
+const LOOK: Duration = Duration::from_millis(5);
 
 /// File in a node's directory that tells tools which configuration runs: its path, then the node's name.
 pub const CONFIG_FILE: &str = "config";
 /// What it resolved to, for programs: a file of the node's directory.
 const RESOLVED_FILE: &str = "node.json";
 
-/// Ends modules of this node that still live though no launch watches them, and removes mailboxes that nobody owns
-/// and streams that nobody writes.
+/// Ends modules of this node that an earlier launch started and that still live, and removes mailboxes that nobody owns
+/// and streams that nobody writes. Nobody is sent a signal as long as one process is not known to be such a module.
 pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str) -> Result<Vec<String>, LaunchError> {
-    let ours = || {
-        // A participant that joins or leaves just now has no name in the table, or no number; 0 would be our own
-        // process group.
-        let other = |pid: u32| pid != std::process::id() && pid != 0;
-        let named = |name| installation.modules_on(node_name).any(|module| module.name == name);
-        node.participants().into_iter().filter(move |p| named(p.module) && other(p.pid)).collect::<Vec<_>>()
-    };
-    let mut notes = Vec::new();
-    for participant in ours() {
-        let name = installation.classes.format(participant.module);
-        notes.push(format!(
-            "{name} (process {}) ran already, left over from an earlier launch or started by hand; ended",
-            participant.pid
-        ));
-        send(participant.pid, Signal::SIGTERM);
-    }
+    let leftovers = Leftovers { node, installation, node_name };
     let patience = installation.modules_on(node_name).map(|module| module.stop_within).max().unwrap_or_default();
+    let processes = leftovers.identify(Instant::now() + patience)?;
+    let mut notes = Vec::new();
+    for (module, process) in &processes {
+        let pid = process.pid();
+        notes.push(format!("{module} (process {pid}) ran already, left over from an earlier launch; ended"));
+        // It has ended already, or is another user's: the loop below sees whether it still lives.
+        let _ = process.terminate();
+    }
     let deadline = Instant::now() + patience;
-    loop {
-        let left = ours();
-        let Some(first) = left.first() else { break };
+    while let Some(left) = leftovers.living().first() {
         if Instant::now() >= deadline + KILL_TIME {
-            return Err(LaunchError::Leftover(installation.classes.format(first.module), first.pid));
+            return Err(LaunchError::Leftover(installation.classes.format(left.module), left.pid));
         }
         if Instant::now() >= deadline {
-            left.iter().for_each(|participant| send(participant.pid, Signal::SIGKILL));
+            processes.iter().for_each(|(_, process)| drop(process.kill()));
         }
-        std::thread::sleep(Duration::from_millis(5));
+        std::thread::sleep(LOOK);
     }
     // A new start begins with empty mailboxes: what was meant for the last run must not drive this one.
     for name in node.mailboxes()? {
@@ -62,11 +55,47 @@ pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str
     Ok(notes)
 }
 
-fn send(pid: u32, signal: Signal) {
-    // What stands in shared memory is a claim: numbers that mean a group, or all, are nobody's.
-    if let Some(pid) = i32::try_from(pid).ok().filter(|pid| *pid > 1) {
-        // Gone already, or another user's: the loop sees whether it still lives.
-        let _ = kill(Pid::from_raw(pid), signal);
+/// Modules of a node that live though no launch watches them.
+struct Leftovers<'a> {
+    node: &'a Node,
+    installation: &'a Installation,
+    node_name: &'a str,
+}
+
+impl Leftovers<'_> {
+    fn living(&self) -> Vec<ParticipantInfo> {
+        let named = |name| self.installation.modules_on(self.node_name).any(|module| module.name == name);
+        // Our own number may be that of a process in another container.
+        let is_own = |it: &ParticipantInfo| it.pid == std::process::id() && self.node.process_of(it).is_ok();
+        self.node.participants().into_iter().filter(|it| named(it.module) && !is_own(it)).collect()
+    }
+
+    /// Their processes, by their modules' names. Until `deadline` it waits for those that it may not end: the last
+    /// launch has died a moment ago, perhaps, and they are about to.
+    fn identify(&self, deadline: Instant) -> Result<Vec<(String, ParticipantProcess)>, LaunchError> {
+        loop {
+            let processes: Result<Vec<_>, _> = self.living().iter().filter_map(|it| self.process_of(it)).collect();
+            if processes.is_ok() || Instant::now() >= deadline {
+                return processes;
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// A process that a launch started as this module; none when it has ended.
+    fn process_of(&self, found: &ParticipantInfo) -> Option<Result<(String, ParticipantProcess), LaunchError>> {
+        let module = self.installation.classes.format(found.module);
+        let refused = |why| Some(Err(LaunchError::NotStarted { module: module.clone(), pid: found.pid, why }));
+        let process = match self.node.process_of(found) {
+            Ok(process) => process?,
+            Err(why) => return refused(NotStarted::Unknown(why)),
+        };
+        match process.was_given(environment::LAUNCHER) {
+            Ok(true) => Some(Ok((module, process))),
+            Ok(false) => refused(NotStarted::ByHand(found.pid)),
+            Err(_) if process.has_ended() => None,
+            Err(error) => refused(NotStarted::Unknown(ProcessError::Untold(error))),
+        }
     }
 }
 

@@ -63,7 +63,7 @@ pub(super) fn see(
         SnapshotRequest::Survey(scope) => {
             let survey = Survey::within(scope, node, installation, node_name);
             let mut survey = survey.map_err(|error| LookError::Failed(error.to_string()))?;
-            survey.ask_kernel();
+            survey.ask_kernel(node);
             Ok(Snapshot::Survey(Box::new(survey)))
         }
         SnapshotRequest::Mailbox(raw) => match MailboxSnapshot::new(node, Name::from_raw(raw)) {

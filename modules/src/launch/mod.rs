@@ -23,6 +23,7 @@ mod events;
 mod health;
 mod leftovers;
 mod look;
+mod orphans;
 mod policy;
 mod printed;
 mod program;
@@ -30,9 +31,10 @@ mod repeats;
 mod serve;
 mod start;
 
-pub use error::LaunchError;
+pub use error::{LaunchError, NotStarted};
 pub use events::{Event, events};
 pub use leftovers::CONFIG_FILE;
+pub use orphans::reap_orphans;
 
 use crate::launcher::{Known, Phase};
 use crate::output::{Relay, plain};
@@ -206,6 +208,7 @@ impl Launch {
     /// Removes what those leave that have ended, or were told to stay so, and answers tools: a tool that is told that a
     /// module is stopped finds no mailbox of it.
     fn serve(&mut self, ending: bool) {
+        reap_orphans(|ended| self.children.iter().any(|child| child.started() == Some(ended)));
         // At the end all goes at once, with the node.
         if !ending {
             (0..self.children.len()).for_each(|index| self.remove_left_mailboxes(index));
@@ -300,7 +303,7 @@ impl Launch {
     /// When its directory cannot be read.
     pub fn survey(&self) -> Result<Survey, NodeError> {
         let mut survey = Survey::new(&self.node, &self.installation, &self.node_name)?;
-        survey.ask_kernel();
+        survey.ask_kernel(&self.node);
         Ok(survey)
     }
 

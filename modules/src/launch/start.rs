@@ -29,7 +29,7 @@ impl Launch {
         for index in 0..self.children.len() {
             // Unless somebody wants it stopped already.
             if self.children[index].phase() == Phase::Waiting {
-                let note = self.children[index].spawn(Instant::now());
+                let note = self.children[index].spawn(&self.node, Instant::now());
                 self.note(note);
             }
             self.await_ready(index)?;

@@ -85,8 +85,11 @@ pub enum StartError {
     /// A run that cannot be repeated.
     #[error(transparent)]
     Exact(#[from] RunError),
-    /// Launch is gone.
-    #[error("launch, process {0}, ended before this module began")]
+    /// Launch is gone, or out of sight.
+    #[error(
+        "launch, process {0}, ended before this module began, or is no ancestor of this process: a program between \
+         them must wait for it (no `&`, no daemon, no pid namespace), or best become it (`exec`)"
+    )]
     Orphan(u32),
     /// The module said no.
     #[error("{module}: {text}")]

@@ -15,7 +15,8 @@ use crate::made::MadeModule;
 use crate::module::ModuleError;
 use crate::output;
 use nix::sys::prctl::set_pdeathsig;
-use nix::sys::signal::Signal;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use rohrpost_config::{Installation, JOURNAL, MailboxSpec, Scheduling, Start as StartState};
 use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, StreamError, StreamId, SystemClock, Work,
@@ -286,14 +287,31 @@ fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
     let Some(launcher) = launcher else { return Ok(()) };
     set_pdeathsig(Some(Signal::SIGTERM)).map_err(|error| StartError::System("prctl", error.into()))?;
     // It may have died before the call above.
-    if nix::unistd::getppid().as_raw().unsigned_abs() == launcher { Ok(()) } else { Err(StartError::Orphan(launcher)) }
+    if nix::unistd::getppid().as_raw().unsigned_abs() == launcher {
+        return Ok(());
+    }
+    // A program that launch started runs this one, and the kernel tells of that program's end alone.
+    let found = sys::Ancestor::find(launcher).map_err(|error| StartError::System("pidfd_open", error))?;
+    let launch = found.ok_or(StartError::Orphan(launcher))?;
+    let watch = move || {
+        launch.wait_end();
+        // Of ourselves: it cannot fail.
+        let _ = kill(Pid::this(), Signal::SIGTERM);
+    };
+    let spawned = std::thread::Builder::new().name("launch".into()).spawn(watch);
+    spawned.map(drop).map_err(|error| StartError::System("a thread that watches launch", error))
 }
 
-/// On SIGTERM, SIGINT and SIGHUP: ask the loop to end; if it does not within the time, end the process. SIGHUP is how
-/// the kernel wakes a stopped module after its launch has died.
-fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
+/// Signals that ask a process to end: SIGTERM, SIGINT, and SIGHUP unless it was started to ignore that, as by `nohup`.
+pub(crate) fn stop_signals() -> impl Iterator<Item = i32> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGHUP])
+    [SIGTERM, SIGINT, SIGHUP].into_iter().filter(|signal| *signal != SIGHUP || !sys::ignores(SIGHUP))
+}
+
+/// On a signal to stop: ask the loop to end; if it does not within the time, end the process. SIGHUP is how the kernel
+/// wakes a stopped module after its launch has died.
+fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
+    let mut signals = signal_hook::iterator::Signals::new(stop_signals())
         .map_err(|error| StartError::System("signal handlers", error))?;
     let stop = Arc::new(AtomicBool::new(false));
     let (flag, participant) = (stop.clone(), participant.clone());

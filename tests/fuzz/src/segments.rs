@@ -154,7 +154,8 @@ impl Robot {
             assert!(flow.is_same(&flow.clone()));
             let _ = (flow.rate_since(None), flow.rate_since(Some(&flow.clone())), flow.is_publication());
         }
-        let _ = (node.launcher(), node.registry_epoch(), node.route(OTHER), node.state_of(MAILBOX, std::process::id()));
+        let _ =
+            (node.launcher(), node.registry_epoch(), node.route(OTHER), node.last_word_of(MAILBOX, std::process::id()));
         if let Ok(survey) = Survey::new(node, &INSTALLATION, "main") {
             let _ = (survey.received_per_s(&survey, MAILBOX), survey.module(MAILBOX).map(|module| module.lost));
         }

@@ -1,9 +1,8 @@
 //! A process on its way to its end, because somebody wants it so.
 
+use super::process::ModuleProcess;
 use super::{Child, Phase, Repeats};
 use crate::launch::leftovers::KILL_TIME;
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
 use rohrpost_mailbox::Node;
 use std::time::{Duration, Instant};
 
@@ -77,7 +76,7 @@ impl Child {
             self.turn_on = self.configured_on;
         }
         if self.process.is_some() || self.over.is_some() {
-            self.kill(Signal::SIGTERM);
+            self.process.iter().for_each(|process| process.terminate(node));
             self.phase = Phase::Stopping;
             self.ending = Some(ChildShutdown { then, since: now, killed: None, left_behind: false });
         } else if then == Then::Start {
@@ -89,7 +88,7 @@ impl Child {
 
     /// Sees to it that a process that was told to end does.
     pub(super) fn press(&mut self, now: Instant) -> Option<String> {
-        let (within, pid) = (self.stop_within, self.process.as_ref()?.id());
+        let (within, pid) = (self.stop_within, self.pid()?);
         let ending = self.ending.as_mut()?;
         match ending.killed {
             None if now >= ending.press_at(within)? => {
@@ -110,7 +109,7 @@ impl Child {
         let Some(ending) = self.ending.as_mut().filter(|ending| ending.killed.is_none()) else { return false };
         ending.killed = Some(now);
         // A stopped process obeys this one too.
-        self.kill(Signal::SIGKILL);
+        self.process.iter().for_each(ModuleProcess::kill);
         true
     }
 
@@ -123,12 +122,5 @@ impl Child {
     pub(in crate::launch) fn is_gone(&self) -> bool {
         let left_behind = self.ending.as_ref().is_some_and(|ending| ending.left_behind);
         left_behind || self.process.is_none() && self.over.is_none()
-    }
-
-    pub(super) fn kill(&self, signal: Signal) {
-        if let Some(process) = &self.process {
-            // Not reaped yet, so the number still is this child's.
-            let _ = kill(Pid::from_raw(process.id() as i32), signal);
-        }
     }
 }

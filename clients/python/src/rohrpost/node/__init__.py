@@ -70,9 +70,11 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
     bridge = Bridge(module)
     _runs = True
     os.register_at_fork(after_in_child=_forked)
-    # Its runtime goes to the safe state at these, and ends then. Python's own would raise in the middle of that.
+    # Its runtime goes to the safe state at these, and ends then. Python's own would raise in the middle of that. Under
+    # `nohup` SIGHUP stays ignored.
     for ends in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(ends, signal.SIG_DFL)
+        if ends != signal.SIGHUP or signal.getsignal(ends) != signal.SIG_IGN:
+            signal.signal(ends, signal.SIG_DFL)
     listen()
     given = sys.argv[1:] if arguments is None else arguments
     settings = list(module.interface_.settings)

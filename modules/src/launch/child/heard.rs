@@ -1,0 +1,46 @@
+//! What launch hears of a module while it runs: its last word in the node's table.
+
+use super::Child;
+use crate::common::OutputLevel;
+use rohrpost_mailbox::{ModuleState, Node, ParticipantInfo};
+use std::time::Instant;
+
+impl Child {
+    /// What its process said last of itself in the node's table.
+    fn last_word(&self, node: &Node) -> Option<ParticipantInfo> {
+        self.process.as_ref()?.last_word(node)
+    }
+
+    pub(super) fn state_of(&self, node: &Node) -> Option<ModuleState> {
+        self.last_word(node)?.state
+    }
+
+    /// Times that it went into error, as it says itself.
+    pub(in crate::launch) fn errors(&self, node: &Node) -> u32 {
+        self.last_word(node).map_or(0, |word| word.errors)
+    }
+
+    /// The number of the error that it says it is in.
+    pub(in crate::launch) fn in_error(&self, node: &Node) -> Option<u32> {
+        let word = self.last_word(node)?;
+        (word.state == Some(ModuleState::Error)).then_some(word.errors)
+    }
+
+    /// The same, if why is not known yet.
+    pub(in crate::launch) fn asks_why(&mut self, node: &Node) -> Option<u32> {
+        let in_error = self.in_error(node);
+        self.health.asks_why(in_error)
+    }
+
+    /// Looks whether a part of its own code has not come back for long.
+    pub(super) fn note_busy(&mut self, node: &Node, now: Instant) -> Option<String> {
+        let word = self.last_word(node)?;
+        let working = self.health.look(word.in_hand, now)?;
+        let told = format!(
+            "is busy: {}; until that comes back it hears nobody, and what is sent to it waits or is lost",
+            working.told(node, &self.names)
+        );
+        self.printed.say(OutputLevel::Warn, &told, None);
+        Some(format!("{} {told}", self.text))
+    }
+}
