@@ -76,6 +76,7 @@ mod seer;
 #[path = "../../mailbox/tests/common/small_memory.rs"]
 mod small_memory;
 mod start;
+mod strangers;
 mod streams;
 mod streams_described;
 mod streams_killed;
