@@ -62,7 +62,7 @@ pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::runtime::{
     BadRate, ClientError, Context, ContextError, ModuleClock, Moment, OpenValue, Rate, Received, Record, RecordError,
     Start, StartError, Stream, StreamReadError, StreamSubscription, Subscription, TimeTeller, ToolLink, Unreadable,
-    describe, find_other_versions, find_running,
+    describe, find_running, find_unusable,
 };
 pub use rohrpost_modules::serde;
 pub use rohrpost_modules::{

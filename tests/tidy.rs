@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+#[path = "tidy/node_files.rs"]
+mod node_files;
 #[path = "tidy/sources.rs"]
 mod sources;
 #[path = "tidy/words.rs"]
@@ -82,7 +84,6 @@ const LINES_MAX: usize = 400;
 const LONG: &[(&str, usize)] = &[
     ("config/src/reader.rs", 403),
     ("mailbox/proof/loom/src/models.rs", 642),
-    ("mailbox/src/node.rs", 425),
     ("mailbox/src/sender.rs", 425),
     ("mailbox/src/slots.rs", 423),
     ("modules/src/call/deduplicator_simulation.rs", 403),
@@ -176,6 +177,15 @@ fn one_type_name_is_one_thing_in_a_crate() {
     let gone = SHARED_NAMES.iter().filter(|(folder, name, _)| !found.contains(&(*folder, *name)));
     let gone = gone.map(|(folder, name, _)| format!("{folder}: `{name}` is one type by now; drop it"));
     mistakes.extend(gone);
+    assert!(mistakes.is_empty(), "{}", mistakes.join("\n"));
+}
+
+#[test]
+fn files_of_a_node_are_opened_in_one_place() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    find_files(root, &mut files);
+    let mistakes: Vec<String> = files.iter().flat_map(|file| node_files::mistakes(root, file)).collect();
     assert!(mistakes.is_empty(), "{}", mistakes.join("\n"));
 }
 

@@ -3,7 +3,7 @@
 use super::observer::Observer;
 use crate::terminal::Failure;
 use clap::Args;
-use rohrpost::launch::choose_node;
+use rohrpost::launch::{CONFIG_FILE, choose_node};
 use rohrpost::launcher::launcher_of;
 use rohrpost::output::plain;
 use rohrpost::survey::node_of;
@@ -78,13 +78,14 @@ fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
     let running = rohrpost::find_running();
     if running.is_empty() {
         // An unreadable node still exists, so the error must not say that there is none.
-        let others = rohrpost::find_other_versions().into_iter().next();
+        let others = rohrpost::find_unusable().into_iter().next();
         return Err(others.map_or_else(
             || "no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into(),
             Failure::from,
         ));
     }
-    let noted: Vec<(PathBuf, String)> = running.iter().map(|path| noted_config(path)).collect::<Result<_, _>>()?;
+    let note = |path: &PathBuf| noted_config(&*Node::open(path)?);
+    let noted: Vec<(PathBuf, String)> = running.iter().map(note).collect::<Result<_, Failure>>()?;
     let is_meant = |(_, name): &&(PathBuf, String)| node.is_none_or(|node| node == name);
     let mut configs: Vec<&PathBuf> = noted.iter().filter(is_meant).map(|(config, _)| config).collect();
     if configs.is_empty() {
@@ -103,20 +104,20 @@ fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
 }
 
 /// Launch's record of its configuration.
-fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
-    let file = directory.join(rohrpost::launch::CONFIG_FILE);
-    let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
-    match text.lines().collect::<Vec<_>>()[..] {
+fn noted_config(node: &Node) -> Result<(PathBuf, String), Failure> {
+    let told = |what: &str| format!("{}: its file `{CONFIG_FILE}` {what}; say --config FILE", node.path().display());
+    let bytes = node.read_file(CONFIG_FILE)?.ok_or_else(|| told("is not there"))?;
+    match String::from_utf8_lossy(&bytes).lines().collect::<Vec<_>>()[..] {
         [config, node] => Ok((config.into(), node.into())),
-        _ => Err(format!("{} was written by another version of launch; say --config FILE", file.display()).into()),
+        _ => Err(told("was written by another version of launch").into()),
     }
 }
 
 impl Running {
     /// The same node after a new launch: its configuration may have changed.
     pub(super) fn again(&self) -> Result<Self, Failure> {
-        let (config, node_name) = noted_config(self.node.path())?;
         let node = Node::open(self.node.path())?;
+        let (config, node_name) = noted_config(&node)?;
         let (installation, only) = (Installation::load(&config)?, self.only.clone());
         Ok(Self { installation, node_name, node, only, observer: Observer::default() })
     }

@@ -2,7 +2,7 @@
 
 use crate::terminal::{Failure, say};
 use rohrpost::common;
-use rohrpost_mailbox::LAYOUT_VERSION;
+use rohrpost_mailbox::{LAYOUT_VERSION, NodeError};
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
@@ -30,7 +30,8 @@ pub(super) fn text() -> &'static str {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let others: Vec<String> = rohrpost::find_other_versions().iter().map(ToString::to_string).collect();
+    let others = rohrpost::find_unusable().into_iter().filter(|error| matches!(error, NodeError::Version(..)));
+    let others: Vec<String> = others.map(|error| error.to_string()).collect();
     if arguments.json {
         say(serde_json::json!({
             "version": env!("CARGO_PKG_VERSION"), "layout": LAYOUT_VERSION, "common_functions": common::HASH,

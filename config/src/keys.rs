@@ -102,14 +102,20 @@ pub enum KeysError {
     NotRotating(NonZeroU8),
 }
 
-/// Whether only its owner may read a file. The open file is checked, since the name may lead elsewhere by now.
+/// Opens a regular file that only its owner may read. The open file is checked, since the name may lead elsewhere by
+/// now. Clients in other languages have the same rule, and the same words.
 ///
 /// # Errors
-/// [`KeysError::Open`], and [`KeysError::Read`] if that cannot be known.
-pub fn check_secret(path: &Path, file: &File) -> Result<(), KeysError> {
-    let metadata = file.metadata().map_err(|error| KeysError::Read(path.to_owned(), error))?;
+/// [`KeysError::Open`], and what `failed` makes of what the system says.
+pub fn open_secret<E: From<KeysError>>(path: &Path, failed: impl Fn(io::Error) -> E) -> Result<File, E> {
+    // A pipe of this name would be waited for, for ever.
+    let file = OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK).open(path).map_err(&failed)?;
+    let metadata = file.metadata().map_err(&failed)?;
+    if !metadata.is_file() {
+        return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file")));
+    }
     let mode = metadata.permissions().mode() & 0o7777;
-    if mode & OTHERS == 0 { Ok(()) } else { Err(KeysError::Open(path.to_owned(), mode)) }
+    if mode & OTHERS == 0 { Ok(file) } else { Err(KeysError::Open(path.to_owned(), mode).into()) }
 }
 
 impl Keys {
@@ -153,8 +159,7 @@ impl Keys {
     /// [`KeysError::Read`], [`KeysError::Open`] and [`KeysError::Wrong`]
     pub fn load(path: &Path) -> Result<Self, KeysError> {
         let failed = |error| KeysError::Read(path.to_owned(), error);
-        let file = File::open(path).map_err(failed)?;
-        check_secret(path, &file)?;
+        let file = open_secret(path, failed)?;
         let mut text = String::new();
         file.take(FILE_BYTES_MAX).read_to_string(&mut text).map_err(failed)?;
         Self::parse(&text).map_err(|(line, why)| KeysError::Wrong { path: path.to_owned(), line, why })
@@ -338,13 +343,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("robot.keys");
         keys(1, None).create(&path).unwrap();
-        for mode in [0o640, 0o604, 0o660] {
+        for mode in [0o640, 0o604, 0o660, 0o666] {
             std::fs::set_permissions(&path, Permissions::from_mode(mode)).unwrap();
             let said = Keys::load(&path).unwrap_err().to_string();
             assert!(said.contains("chmod 600") && said.contains(&format!("{mode:o}")), "{said}");
         }
         std::fs::set_permissions(&path, Permissions::from_mode(0o400)).unwrap();
         assert_eq!(Keys::load(&path).unwrap(), keys(1, None));
+        std::fs::remove_file(&path).unwrap();
+        nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRWXU).unwrap();
+        let said = Keys::load(&path).unwrap_err().to_string();
+        assert!(said.contains("it is no regular file"), "a pipe is not waited for: {said}");
     }
 
     #[test]

@@ -84,7 +84,7 @@ pub use explain::explain;
 pub use flow::Flow;
 pub use gui::{Gui, Show};
 pub use installation::Installation;
-pub use keys::{KEY_BYTES, Key, Keys, KeysError, check_secret};
+pub use keys::{KEY_BYTES, Key, Keys, KeysError, open_secret};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX, TRANSIT};
 pub use module::{
     BUILTINS, Module, Program, RECORDER, REPLAY, Restart, RestartPolicy, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER,

@@ -16,7 +16,7 @@ use crate::step::step;
 use nix::errno::Errno;
 use nix::fcntl::{OFlag, openat};
 use nix::sys::stat::{Mode, fchmod, fstat};
-use nix::unistd::{UnlinkatFlags, mkfifo, unlinkat, write};
+use nix::unistd::{UnlinkatFlags, mkfifoat, unlinkat, write};
 use std::ffi::CStr;
 use std::io::{self, Write};
 use std::os::fd::{AsFd, OwnedFd};
@@ -85,14 +85,15 @@ fn write_to_pipe(node: &Node, participant: u16) {
 /// no SIGPIPE for a sleeper that has.
 fn open_pipe(node: &Node, participant: u16) -> nix::Result<OwnedFd> {
     let flags = OFlag::O_RDWR | OFlag::O_NONBLOCK | OFlag::O_CLOEXEC | OFlag::O_NOFOLLOW;
-    // By the directory's descriptor and on the stack: ringing takes nothing from the heap.
+    // By the directory's descriptor and on the stack: ringing takes nothing from the heap. What it is, is not asked: a
+    // byte harms nothing that a user may leave there.
     with_name(participant, |name| openat(node.directory(), name, flags, Mode::empty()))
 }
 
 /// Makes the pipe of this participant, which is the caller.
 pub(crate) fn make_pipe(node: &Node, participant: u16) -> io::Result<OwnedFd> {
     remove_pipe(node, participant);
-    mkfifo(&node.path().join(format!("bell.{participant}")), Mode::S_IRUSR | Mode::S_IWUSR)?;
+    with_name(participant, |name| mkfifoat(node.directory(), name, Mode::S_IRUSR | Mode::S_IWUSR))?;
     step!("pipe: made");
     let pipe = open_pipe(node, participant)?;
     // The users that the directory lets in may ring.

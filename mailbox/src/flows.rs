@@ -128,7 +128,7 @@ impl Node {
         let mut flows = Vec::new();
         let mut naps = NAPS;
         for (claimant, participant) in self.living() {
-            let Some(table) = TableView::open(self.path(), claimant) else { continue };
+            let Some(table) = TableView::open(self.directory(), claimant) else { continue };
             let first = flows.len();
             for flow in table.rows().iter().filter_map(|row| look(row, &participant, &mut naps)) {
                 match flows[first..].iter_mut().find(|known: &&mut FlowInfo| known.is_like(&flow)) {

@@ -5,11 +5,12 @@ use crate::counters::ClassTraffic;
 use crate::layout::Shape;
 use crate::lock;
 use crate::name::{Name, Priority};
-use crate::node::{Node, NodeError};
+use crate::node::Node;
+use crate::node_error::NodeError;
 use crate::owned::{BadSegment, OWNER_BYTE};
 use crate::segment::{Segment, name_of};
 use crate::word::{Claimant, State, Victim, Word};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io;
 use std::sync::atomic::Ordering;
 
@@ -116,15 +117,15 @@ impl Node {
     /// When its directory cannot be read.
     pub fn mailboxes(&self) -> Result<Vec<Name>, NodeError> {
         let failed = |error| NodeError::of(self.path(), error);
-        let entries = fs::read_dir(self.path()).map_err(failed)?;
-        let mut names: Vec<Name> = entries.filter_map(|entry| name_of(&entry.ok()?.path())).collect();
+        let files = self.directory().names().map_err(failed)?;
+        let mut names: Vec<Name> = files.filter_map(|file| name_of(&file)).collect();
         names.sort_unstable();
         Ok(names)
     }
 
     /// A mailbox as it is now; none when it does not exist (any more), or cannot be read.
     pub fn look_at(&self, name: Name) -> Option<MailboxInfo> {
-        let (segment, file) = Segment::look_at(self.path(), name).ok()?;
+        let (segment, file) = Segment::look_at(self.directory(), name).ok()?;
         let slots = segment.slots();
         Some(info(&segment, &file, (0..slots.count()).map(|slot| slots.load(slot))))
     }
@@ -134,7 +135,7 @@ impl Node {
     /// # Errors
     /// When there is no such mailbox, or what is there is none.
     pub fn inspect(&self, name: Name) -> Result<MailboxDetail, InspectError> {
-        let (segment, file) = match Segment::look_at(self.path(), name) {
+        let (segment, file) = match Segment::look_at(self.directory(), name) {
             Ok(seen) => seen,
             Err(BadSegment::Io(error)) if error.kind() == io::ErrorKind::NotFound => {
                 return Err(InspectError::Missing(name));

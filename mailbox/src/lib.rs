@@ -87,6 +87,7 @@
 
 mod about;
 mod bell;
+mod beside;
 mod bodies;
 mod causes;
 mod cell;
@@ -107,6 +108,7 @@ mod mapped;
 mod memory;
 mod name;
 mod node;
+mod node_error;
 mod owned;
 mod package;
 mod participant;
@@ -145,7 +147,8 @@ pub use inspect::{InspectError, MailboxDetail, MailboxInfo, Party, SlotInfo, Vic
 pub use label::Label;
 pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
-pub use node::{LaunchLock, Node, NodeError, base_directory, node_directory, remove_base_if_empty};
+pub use node::{LaunchLock, Node, base_directory, node_directory, remove_base_if_empty};
+pub use node_error::NodeError;
 pub use owned::BadFile;
 pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
 pub use participant::Participant;

@@ -19,26 +19,27 @@
 
 use crate::doorbell;
 use crate::entry::{Entry, PARTICIPANTS_MAX, ParticipantInfo};
-use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
+use crate::files::{Directory, allocate, remove_if_empty};
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, AllHeld, Held};
 use crate::memory::{Located, Mapping, Shared, Use};
 use crate::name::Name;
+use crate::node_error::{NodeError, REGISTRY_PATIENCE};
 use crate::step::step;
 use crate::word::Claimant;
-use std::fs::{self, File, OpenOptions};
+use std::fs::File;
 use std::io;
-use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+/// The file of the page.
+const FILE: &str = "node";
 /// Lock bytes above the participants': of the process that launched the node, and of the one that changes the registry.
 const LAUNCH_BYTE: u64 = 1 << 20;
 const REGISTRY_BYTE: u64 = LAUNCH_BYTE + 1;
-/// Changing the registry takes microseconds; a process that holds it longer is stopped.
-pub(crate) const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
 /// Between two tries: as long as making a mailbox takes, then longer and longer.
 const REGISTRY_PAUSE: Duration = Duration::from_micros(50);
 const REGISTRY_PAUSE_MAX: Duration = Duration::from_millis(1);
@@ -64,58 +65,6 @@ unsafe impl Shared for NodePage {}
 
 const _: () = assert!(size_of::<Entry>() == 64 && size_of::<NodePage>() == 64 + PARTICIPANTS_MAX * 64);
 
-/// Why a node's directory could not be used.
-#[derive(Debug, thiserror::Error)]
-pub enum NodeError {
-    /// The system said no.
-    #[error("node directory {0}: {1}")]
-    Io(PathBuf, #[source] io::Error),
-    /// Somebody else could have put it there.
-    #[error("node directory {0} belongs to user {1}, not to us; remove it, or set ROHRPOST_DIR to another place")]
-    Foreign(PathBuf, u32),
-    /// Another version's layout.
-    #[error(
-        "node {0} was made by another version of Rohrpost (layout {1}, this program has {VERSION}); use the \
-         `rohrpost` that launched it, or stop what runs there and remove the directory"
-    )]
-    Version(PathBuf, u32),
-    /// No memory, most likely.
-    #[error("node {path}: no shared memory: {source}; is it full (df {})?", crate::files::existing(path).display())]
-    Memory {
-        /// Its directory.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// As many files are open as may be.
-    #[error(
-        "node {0}: this process, or the computer, has no file descriptor left; raise the limit (ulimit -n, or \
-         LimitNOFILE= of a service)"
-    )]
-    Descriptors(PathBuf),
-    /// Another user's.
-    #[error(
-        "node {0}: permission denied; be the user that owns the node, or have its `mode` in the configuration let \
-         you in"
-    )]
-    Denied(PathBuf),
-    /// Cut off, or somebody else's.
-    #[error("node {0}: its file `node` is damaged, or not Rohrpost's; stop what runs there and remove the directory")]
-    Damaged(PathBuf),
-    /// No such node, or it was removed after it was opened.
-    #[error("no node at {0}: is it launched?")]
-    Missing(PathBuf),
-    /// Nothing free in the table.
-    #[error("node {0} has {PARTICIPANTS_MAX} participants already; end some, or spread them over nodes")]
-    Crowded(PathBuf),
-    /// Somebody stopped while changing the registry.
-    #[error("node {0}: the registry has been locked for {REGISTRY_PATIENCE:?}; is a process there stopped or traced?")]
-    Busy(PathBuf),
-    /// It runs already.
-    #[error("node {0} is launched already, by process {1}; stop that one first")]
-    Launched(PathBuf, u32),
-}
-
 /// Where the directories of this user's nodes lie: `$ROHRPOST_DIR`, or else below /dev/shm.
 pub fn base_directory() -> PathBuf {
     match std::env::var_os("ROHRPOST_DIR") {
@@ -128,8 +77,7 @@ pub fn base_directory() -> PathBuf {
 /// stays.
 pub fn remove_base_if_empty() {
     if std::env::var_os("ROHRPOST_DIR").is_none() {
-        // Refused when something is in it, as it should be.
-        let _ = fs::remove_dir(base_directory());
+        remove_if_empty(&base_directory());
     }
 }
 
@@ -140,25 +88,12 @@ pub fn node_directory(installation: &str, node: &str) -> PathBuf {
 
 /// A node's shared memory, opened by this process.
 pub struct Node {
-    path: PathBuf,
+    directory: Directory,
     /// Holds no lock, so that it can ask about all.
     file: File,
-    directory: File,
     /// Device and number of the file, by which it is known again.
     identity: (u64, u64),
     page: Located<NodePage>,
-}
-
-impl NodeError {
-    /// What the system said of a file of the node's.
-    pub(crate) fn of(path: &Path, source: io::Error) -> Self {
-        match &source {
-            error if is_lack_of_memory(error) => Self::Memory { path: path.into(), source },
-            error if error.kind() == io::ErrorKind::PermissionDenied => Self::Denied(path.into()),
-            error if is_lack_of_descriptors(error) => Self::Descriptors(path.into()),
-            _ => Self::Io(path.into(), source),
-        }
-    }
 }
 
 impl Node {
@@ -167,51 +102,36 @@ impl Node {
     /// # Errors
     /// When the directory cannot be made or is not ours to trust.
     pub fn create(path: &Path, mode: u32) -> Result<Arc<Self>, NodeError> {
-        let failed = |error| NodeError::of(path, error);
-        let made = fs::DirBuilder::new().recursive(true).mode(mode).create(path);
-        made.map_err(failed)?;
-        let us = nix::unistd::getuid().as_raw();
-        let owner = |path: &Path| fs::symlink_metadata(path).map(|metadata| metadata.uid()).map_err(failed);
-        if owner(path)? != us {
-            return Err(NodeError::Foreign(path.into(), owner(path)?));
-        }
-        // The owner of the folder around it could put another directory in its place.
-        if let Some(around) = path.parent().filter(|around| !around.as_os_str().is_empty()) {
-            let owner = owner(around)?;
-            if owner != us && owner != 0 {
-                return Err(NodeError::Foreign(around.into(), owner));
-            }
-        }
-        fs::set_permissions(path, fs::Permissions::from_mode(mode)).map_err(failed)?;
-        Self::open_file(path, true)
+        let directory = Directory::make(path, mode).map_err(|error| NodeError::of(path, error))?;
+        Self::open_file(directory, |directory| directory.open_or_make(FILE))
     }
 
     /// Opens a node that is there.
     ///
     /// # Errors
-    /// [`NodeError::Missing`] when nobody has made it.
+    /// [`NodeError::Missing`] when nobody has made it; [`NodeError::Foreign`] when another user has, and
+    /// `$ROHRPOST_DIR` does not lead there.
     pub fn open(path: &Path) -> Result<Arc<Self>, NodeError> {
-        Self::open_file(path, false)
+        let directory = Directory::open(path).map_err(|error| NodeError::of_node(path, error))?;
+        Self::open_file(directory, |directory| directory.open_file(FILE))
     }
 
-    fn open_file(path: &Path, create: bool) -> Result<Arc<Self>, NodeError> {
+    fn open_file(
+        directory: Directory,
+        open: impl FnOnce(&Directory) -> io::Result<File>,
+    ) -> Result<Arc<Self>, NodeError> {
+        let path = directory.path();
         let failed = |error| NodeError::of(path, error);
-        let file = match open_shared(&path.join("node"), create) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(NodeError::Missing(path.into())),
-            opened => opened.map_err(failed)?,
-        };
+        let file = open(&directory).map_err(|error| NodeError::of_node(path, error))?;
         // Only its maker needs the registry to itself; another may have made it before this one had the registry.
-        let maker = if is_whole(path, &file)? { None } else { Some(RegistryLock::take(path)?) };
+        let maker = if is_whole(path, &file)? { None } else { Some(RegistryLock::take(&directory)?) };
         let bytes = size_of::<NodePage>();
         if maker.is_some() && !is_whole(path, &file)? && file.metadata().map_err(failed)?.len() < bytes as u64 {
             allocate(&file, bytes).map_err(failed)?;
         }
-        // Not to be read, only to find pipes by.
-        let flags = libc::O_PATH | libc::O_DIRECTORY | libc::O_CLOEXEC;
-        let directory = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
         let page = Mapping::new(&file, bytes, Use::Share).map_err(failed)?.locate(0);
         let there = file.metadata().map_err(failed)?;
-        let node = Self { path: path.into(), page, identity: (there.dev(), there.ino()), file, directory };
+        let node = Self { page, identity: (there.dev(), there.ino()), file, directory };
         if maker.is_some() {
             node.check_in()?;
         }
@@ -233,16 +153,16 @@ impl Node {
         // A process of another version may have made it between the look before and the lock.
         match page.version.load(Ordering::Relaxed) {
             VERSION => Ok(()),
-            other => Err(NodeError::Version(self.path.clone(), other)),
+            other => Err(NodeError::Version(self.path().into(), other)),
         }
     }
 
     /// Its directory.
     pub fn path(&self) -> &Path {
-        &self.path
+        self.directory.path()
     }
 
-    pub(crate) fn directory(&self) -> &File {
+    pub(crate) fn directory(&self) -> &Directory {
         &self.directory
     }
 
@@ -331,30 +251,30 @@ impl Node {
     /// # Errors
     /// [`NodeError::Launched`] names the process that is it already.
     pub fn launch_lock(self: &Arc<Self>) -> Result<LaunchLock, NodeError> {
-        let failed = |error| NodeError::of(&self.path, error);
-        let file = open_shared(&self.path.join("node"), false).map_err(failed)?;
+        let failed = |error| NodeError::of(self.path(), error);
+        let file = open_once_more(&self.directory)?;
         let Some(held) = Held::try_take(file, LAUNCH_BYTE).map_err(failed)? else {
-            return Err(NodeError::Launched(self.path.clone(), self.page().launch_pid.load(Ordering::Acquire)));
+            return Err(NodeError::Launched(self.path().into(), self.page().launch_pid.load(Ordering::Acquire)));
         };
         self.check_present(&held.file)?;
         self.page().launch_pid.store(std::process::id(), Ordering::Release);
         Ok(LaunchLock { _held: held })
     }
 
-    /// Whether `file`, just opened by its path, is the one that this node has mapped: the directory may have been
+    /// Whether `file`, just opened by its name, is the one that this node has mapped: the directory may have been
     /// removed. Asked when its lock is held; until then somebody may be removing it.
     pub(crate) fn check_present(&self, file: &File) -> Result<(), NodeError> {
-        let failed = |error| NodeError::of(&self.path, error);
+        let failed = |error| NodeError::of(self.path(), error);
         let there = file.metadata().map_err(failed)?;
         let present = (there.dev(), there.ino()) == self.identity && there.nlink() > 0;
-        if present { Ok(()) } else { Err(NodeError::Missing(self.path.clone())) }
+        if present { Ok(()) } else { Err(NodeError::Missing(self.path().into())) }
     }
 
     /// Takes the launch's place and every participant's; none when somebody has one of them. So nobody can join or
     /// launch until the result is dropped.
     pub(crate) fn keep_all_out(&self) -> Result<Option<AllHeld>, NodeError> {
-        let failed = |error| NodeError::of(&self.path, error);
-        let held = AllHeld(open_shared(&self.path.join("node"), false).map_err(failed)?);
+        let failed = |error| NodeError::of(self.path(), error);
+        let held = AllHeld(open_once_more(&self.directory)?);
         // The launch's first: on a node that runs nothing else is taken, not even for a moment in which somebody wants
         // to join.
         for byte in std::iter::once(LAUNCH_BYTE).chain(0..PARTICIPANTS_MAX as u64) {
@@ -377,19 +297,19 @@ pub(crate) struct RegistryLock {
 }
 
 impl RegistryLock {
-    pub(crate) fn take(path: &Path) -> Result<Self, NodeError> {
-        Self::take_within(path, REGISTRY_PATIENCE)
+    pub(crate) fn take(directory: &Directory) -> Result<Self, NodeError> {
+        Self::take_within(directory, REGISTRY_PATIENCE)
     }
 
     /// The same, with less patience; with none it is tried once.
-    pub(crate) fn take_within(path: &Path, patience: Duration) -> Result<Self, NodeError> {
-        let failed = |error| NodeError::of(path, error);
-        let file = open_shared(&path.join("node"), false).map_err(failed)?;
+    pub(crate) fn take_within(directory: &Directory, patience: Duration) -> Result<Self, NodeError> {
+        let failed = |error| NodeError::of(directory.path(), error);
+        let file = open_once_more(directory)?;
         let start = Instant::now();
         let mut pause = REGISTRY_PAUSE;
         while !lock::try_lock(&file, REGISTRY_BYTE).map_err(failed)? {
             if patience.is_zero() || start.elapsed() > patience {
-                return Err(NodeError::Busy(path.into()));
+                return Err(NodeError::Busy(directory.path().into()));
             }
             std::thread::sleep(pause);
             pause = (pause * 2).min(REGISTRY_PAUSE_MAX);
@@ -404,14 +324,19 @@ impl Drop for RegistryLock {
     }
 }
 
+/// Opens the file `node` again, to lock a byte of it.
+pub(crate) fn open_once_more(directory: &Directory) -> Result<File, NodeError> {
+    directory.open_file(FILE).map_err(|error| NodeError::of_node(directory.path(), error))
+}
+
 /// Whether a node's file is finished; false when it was just begun, or its maker died. Every version begins its files
 /// with the magic number, which is written last, and its version.
 fn is_whole(path: &Path, file: &File) -> Result<bool, NodeError> {
     let failed = |error| NodeError::of(path, error);
     let (there, mut magic, mut version) = (file.metadata().map_err(failed)?, [0; 8], [0; 4]);
     match there.len() {
-        0 if there.is_file() => return Ok(false),
-        12.. if there.is_file() => {}
+        0 => return Ok(false),
+        12.. => {}
         _ => return Err(NodeError::Damaged(path.into())),
     }
     file.read_exact_at(&mut magic, 0).map_err(failed)?;

@@ -4,15 +4,16 @@
 //! All changes happen under the node's registry lock, and a file is only changed by the holder of its owner's lock. A
 //! file gets its name last, whole; so nobody ever opens half of one.
 
-use crate::files::{allocate, open_shared};
+use crate::files::{Unfit, allocate};
 use crate::layout::VERSION;
 use crate::lock::Held;
 use crate::memory::Use;
-use crate::node::{Node, NodeError, RegistryLock};
+use crate::node::{Node, RegistryLock};
+use crate::node_error::NodeError;
 use crate::step::step;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The byte of a file that its owner locks.
 pub(crate) const OWNER_BYTE: u64 = 0;
@@ -53,6 +54,13 @@ pub(crate) enum BadSegment {
     File(#[from] BadFile),
 }
 
+impl BadSegment {
+    /// What opening the file said; what it should be.
+    pub(crate) fn of_open(what: &'static str, error: io::Error) -> Self {
+        if Unfit::is_kind(&error) { BadFile::Foreign(what).into() } else { error.into() }
+    }
+}
+
 /// A kind of file that one participant owns.
 pub(crate) trait Owned: Sized {
     /// The word for it.
@@ -62,8 +70,8 @@ pub(crate) trait Owned: Sized {
     /// What it is made as.
     type Shape: Copy;
 
-    /// Its file.
-    fn path(node: &Path, id: Self::Id) -> PathBuf;
+    /// The name of its file.
+    fn file_name(id: Self::Id) -> String;
     /// How long the file is.
     fn bytes(shape: &Self::Shape) -> usize;
     /// Maps a file and checks that it is this, whole.
@@ -104,20 +112,22 @@ pub(crate) fn obtain<S: Owned>(
     shape: S::Shape,
     _registry: &RegistryLock,
 ) -> Result<(S, Held), Refused<S>> {
-    let path = S::path(node.path(), id);
-    match take_over(&path, id, &shape)? {
+    match take_over(node, id, &shape)? {
         Predecessor::Same(segment, lock) => Ok((segment, lock)),
-        Predecessor::Other(old) => make(node, &path, id, shape, Some(&old)),
-        Predecessor::None => make(node, &path, id, shape, None),
+        Predecessor::Other(old) => make(node, id, shape, Some(&old)),
+        Predecessor::None => make(node, id, shape, None),
     }
 }
 
 /// Looks at what is there, as its owner, and adopts it if it is the same.
-fn take_over<S: Owned>(path: &Path, id: S::Id, shape: &S::Shape) -> Result<Predecessor<S>, Refused<S>> {
-    let failed = |source| Refused::File(path.into(), source);
-    let file = match open_shared(path, false) {
+fn take_over<S: Owned>(node: &Node, id: S::Id, shape: &S::Shape) -> Result<Predecessor<S>, Refused<S>> {
+    let name = S::file_name(id);
+    let failed = |source| Refused::File(node.path().join(&name), source);
+    let file = match node.directory().open_file(&name) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
+        // It gives way to what is made.
+        Err(error) if Unfit::is_kind(&error) => return Ok(Predecessor::None),
         Err(error) => return Err(failed(error)),
     };
     let old = match S::check(&file, id, Use::Keep) {
@@ -137,18 +147,12 @@ fn take_over<S: Owned>(path: &Path, id: S::Id, shape: &S::Shape) -> Result<Prede
 
 /// Makes the file, whole, then gives it its name. The old one is given up only when the new one is whole: without
 /// memory for that, what the old one holds stays.
-fn make<S: Owned>(
-    node: &Node,
-    path: &Path,
-    id: S::Id,
-    shape: S::Shape,
-    old: Option<&S>,
-) -> Result<(S, Held), Refused<S>> {
-    // One maker at a time (the registry's lock), so one temporary name will do; a dead maker's leftover is overwritten.
-    let unfinished = node.path().join("unfinished");
+fn make<S: Owned>(node: &Node, id: S::Id, shape: S::Shape, old: Option<&S>) -> Result<(S, Held), Refused<S>> {
+    // One maker at a time (the registry's lock), so one temporary name will do.
+    const UNFINISHED: &str = "unfinished";
+    let directory = node.directory();
     let made = || {
-        let _ = fs::remove_file(&unfinished);
-        let file = open_shared(&unfinished, true)?;
+        let file = directory.make_anew(UNFINISHED)?;
         step!("create: file");
         allocate(&file, S::bytes(&shape))?;
         step!("create: allocated");
@@ -159,13 +163,13 @@ fn make<S: Owned>(
             segment.replace(old);
             step!("create: carried over");
         }
-        fs::rename(&unfinished, path)?;
+        directory.rename(UNFINISHED, &S::file_name(id))?;
         step!("create: named");
         Ok((segment, lock))
     };
     made().map_err(|source| {
-        let _ = fs::remove_file(&unfinished);
-        Refused::File(unfinished, source)
+        let _ = directory.remove(UNFINISHED);
+        Refused::File(node.path().join(UNFINISHED), source)
     })
 }
 
@@ -175,10 +179,15 @@ pub(crate) fn remove_orphan<S: Owned>(
     id: S::Id,
     unlink: impl FnOnce() -> Result<(), NodeError>,
 ) -> Result<bool, NodeError> {
-    let path = S::path(node.path(), id);
-    let Ok(file) = open_shared(&path, false) else { return Ok(false) };
+    let name = S::file_name(id);
+    let file = match node.directory().open_file(&name) {
+        Ok(file) => file,
+        // Nobody can own it.
+        Err(error) if Unfit::is_kind(&error) => return unlink().map(|()| true),
+        Err(_) => return Ok(false),
+    };
     let old = S::check(&file, id, Use::Share);
-    let held = Held::try_take(file, OWNER_BYTE).map_err(|error| NodeError::Io(path, error))?;
+    let held = Held::try_take(file, OWNER_BYTE).map_err(|error| NodeError::Io(node.path().join(name), error))?;
     let Some(_owner) = held else { return Ok(false) };
     if let Ok(old) = old {
         old.retire();

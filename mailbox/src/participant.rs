@@ -2,10 +2,10 @@
 
 use crate::doorbell;
 use crate::entry::{COMPLAINS, Entry, ModuleState, PARTICIPANTS_MAX};
-use crate::files::open_shared;
 use crate::lock;
 use crate::name::Name;
-use crate::node::{Node, NodeError};
+use crate::node::{Node, open_once_more};
+use crate::node_error::NodeError;
 use crate::step::step;
 use crate::traffic::Table;
 use crate::word::Claimant;
@@ -36,7 +36,7 @@ impl Participant {
     /// [`NodeError::Crowded`] when there is none.
     pub fn join(node: &Arc<Node>, module: Name) -> Result<Arc<Self>, NodeError> {
         let failed = |error| NodeError::of(node.path(), error);
-        let file = open_shared(&node.path().join("node"), false).map_err(failed)?;
+        let file = open_once_more(node.directory())?;
         for participant in 0..PARTICIPANTS_MAX as u16 {
             if !lock::try_lock(&file, u64::from(participant)).map_err(failed)? {
                 continue;
@@ -173,7 +173,7 @@ impl Participant {
         entry.pid.store(0, Ordering::Release);
         // In a directory that was removed and made anew, the file of this name is somebody else's.
         if self.node.check_present(&self.file).is_ok() {
-            self.traffic.remove();
+            self.traffic.remove(&self.node);
         }
     }
 }

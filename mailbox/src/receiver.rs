@@ -7,7 +7,7 @@ use crate::counters::Loss;
 use crate::layout::{Shape, stored_ns};
 use crate::lock::Held;
 use crate::name::{Name, Priority};
-use crate::node::NodeError;
+use crate::node_error::NodeError;
 use crate::package::{Head, Options};
 use crate::participant::Participant;
 use crate::queue::Queue;

@@ -6,15 +6,16 @@ use crate::files::{is_lack_of_descriptors, is_lack_of_memory};
 use crate::layout::{Shape, ShapeError};
 use crate::memory::Use;
 use crate::name::Name;
-use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock};
+use crate::node::{Node, RegistryLock};
+use crate::node_error::{NodeError, REGISTRY_PATIENCE};
 use crate::owned::{self, BadSegment, Owned, Refused};
 use crate::participant::Participant;
 use crate::queue::Queue;
 use crate::receiver::Receiver;
-use crate::segment::{Segment, WHAT, path_of};
+use crate::segment::{Segment, WHAT, file_name};
 use crate::step::step;
 use crate::unlink::unlink;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -95,7 +96,7 @@ impl Participant {
         }
         shape.check().map_err(|error| CreateError::Shape(name, error))?;
         let shape = shape.as_stored();
-        let taken = RegistryLock::take(self.node().path());
+        let taken = RegistryLock::take(self.node().directory());
         let registry = taken.map_err(|error| CreateError::of_node(name, error))?;
         let (segment, lock) =
             owned::obtain::<Segment>(self.node(), name, shape, &registry).map_err(|why| match why {
@@ -120,8 +121,8 @@ impl Owned for Segment {
     type Id = Name;
     type Shape = Shape;
 
-    fn path(node: &Path, name: Name) -> PathBuf {
-        path_of(node, name)
+    fn file_name(name: Name) -> String {
+        file_name(name)
     }
 
     fn bytes(shape: &Shape) -> usize {
@@ -192,7 +193,7 @@ impl Node {
     }
 
     fn remove_orphan_within(&self, name: Name, patience: Duration) -> Result<bool, NodeError> {
-        let registry = RegistryLock::take_within(self.path(), patience)?;
+        let registry = RegistryLock::take_within(self.directory(), patience)?;
         owned::remove_orphan::<Segment>(self, name, || unlink(self, name, &registry))
     }
 
@@ -206,7 +207,7 @@ impl Node {
             self.remove_orphan(name)?;
         }
         let failed = |error| NodeError::Io(self.path().into(), error);
-        fs::remove_dir_all(self.path()).map_err(failed)?;
+        self.directory().remove_all().map_err(failed)?;
         Ok(true)
     }
 }

@@ -8,13 +8,12 @@
 //! This crate does not know why: the router of the node works it out from the configuration. The file appears whole. It
 //! is read only for a name that has no mailbox here, when a [`Sender`](crate::Sender) is opened.
 
-use crate::files::{open_shared, open_to_read};
+use crate::files::Directory;
 use crate::layout::{MAGIC, VERSION};
 use crate::name::Name;
-use crate::node::{Node, NodeError};
-use std::fs;
-use std::io::{self, Read, Write};
-use std::path::Path;
+use crate::node::Node;
+use crate::node_error::NodeError;
+use std::io;
 
 /// Ranges that a node can have: all instances of every class of a system, alone.
 pub const ROUTES_MAX: usize = 65_536;
@@ -64,16 +63,8 @@ impl Node {
             bytes.extend_from_slice(&last.raw().to_ne_bytes());
         }
         // Named after its writer: two that write at once must not write into one.
-        let (path, unfinished) = (self.path().join(file), self.path().join(format!("{file}.{}", std::process::id())));
-        let write = || {
-            let _ = fs::remove_file(&unfinished);
-            open_shared(&unfinished, true)?.write_all(&bytes)?;
-            fs::rename(&unfinished, &path)
-        };
-        write().map_err(|error: io::Error| {
-            let _ = fs::remove_file(&unfinished);
-            NodeError::of(&path, error)
-        })?;
+        let put = self.directory().put(file, &format!("{file}.{}", std::process::id()), &bytes);
+        put.map_err(|error| NodeError::of(&self.path().join(file), error))?;
         // A sender that did not find a name before may find a way to it now.
         self.raise_registry_epoch();
         Ok(())
@@ -84,11 +75,11 @@ impl Node {
     /// # Errors
     /// When the file cannot be removed.
     pub fn forget_routes(&self) -> Result<(), NodeError> {
-        for path in [FILE, BEYOND].map(|file| self.path().join(file)) {
-            match fs::remove_file(&path) {
+        for file in [FILE, BEYOND] {
+            match self.directory().remove(file) {
                 Ok(()) => self.raise_registry_epoch(),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                Err(error) => return Err(NodeError::of(&path, error)),
+                Err(error) => return Err(NodeError::of(&self.path().join(file), error)),
             }
         }
         Ok(())
@@ -97,29 +88,24 @@ impl Node {
     /// The mailbox of the router that takes packages for this name to another node; none if it has no route. A name
     /// with a mailbox on this node may have one too: nobody follows it.
     pub fn route(&self, name: Name) -> Option<Name> {
-        find(self.path(), name).ok().flatten()
+        find(self.directory(), name).ok().flatten()
     }
 }
 
 /// The mailbox that packages for a name go to, or what is wrong with the file.
-pub(crate) fn find(node: &Path, name: Name) -> Result<Option<Name>, String> {
+pub(crate) fn find(node: &Directory, name: Name) -> Result<Option<Name>, String> {
     match find_in(node, FILE, name)? {
         None => find_in(node, BEYOND, name),
         found => Ok(found),
     }
 }
 
-fn find_in(node: &Path, file_name: &str, name: Name) -> Result<Option<Name>, String> {
-    let mut bytes = Vec::new();
-    let unread = |error: io::Error| format!("its file `{file_name}`: {error}");
-    match open_to_read(&node.join(file_name)) {
-        Ok(file) => {
-            let most = (HEAD_BYTES + ROUTES_MAX * RANGE_BYTES) as u64;
-            file.take(most).read_to_end(&mut bytes).map_err(unread)?;
-        }
+fn find_in(node: &Directory, file_name: &str, name: Name) -> Result<Option<Name>, String> {
+    let bytes = match node.read(file_name) {
+        Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(unread(error)),
-    }
+        Err(error) => return Err(format!("its file `{file_name}`: {error}")),
+    };
     // Another process wrote it.
     let router = if file_name == BEYOND { "client of the TCP router" } else { "router" };
     look_up(&bytes, name).ok_or_else(|| {
@@ -144,6 +130,7 @@ fn look_up(bytes: &[u8], name: Name) -> Option<Option<Name>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     const VIA: Name = Name::new(1, 250, 0, 3);
 

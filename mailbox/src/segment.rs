@@ -2,7 +2,7 @@
 
 use crate::bodies::Bodies;
 use crate::clock::monotonic_ns;
-use crate::files::{open_shared, open_to_read};
+use crate::files::Directory;
 use crate::layout::{Identity, PAGE, Page, SLOT_PREFIX, Shape};
 use crate::mapped;
 use crate::memory::{Located, Mapping, Rooms, Use};
@@ -13,7 +13,7 @@ use crate::slots::{Claim, Slots, Taken};
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -38,18 +38,18 @@ pub(crate) struct Segment {
 pub(crate) const WHAT: &str = "mailbox";
 
 /// The file of a mailbox.
-pub(crate) fn path_of(node: &Path, name: Name) -> PathBuf {
-    node.join(format!("{:08x}.mbx", name.raw()))
+pub(crate) fn file_name(name: Name) -> String {
+    format!("{:08x}.mbx", name.raw())
 }
 
-/// The mailbox a file of a node's directory belongs to.
+/// The mailbox a file of this name belongs to.
 pub(crate) fn name_of(path: &Path) -> Option<Name> {
     if path.extension()? != "mbx" {
         return None;
     }
     let name = u32::from_str_radix(path.file_stem()?.to_str()?, 16).ok().map(Name::from_raw)?;
     // `1.mbx` is nobody's: a name has exactly one file.
-    (path.file_name() == path_of(Path::new(""), name).file_name()).then_some(name)
+    (path == Path::new(&file_name(name))).then_some(name)
 }
 
 impl Segment {
@@ -61,15 +61,15 @@ impl Segment {
     }
 
     /// The mailbox of this name as it stands, to send there; mapped once, however many of this process send there.
-    pub(crate) fn open(node: &Path, name: Name) -> Result<Self, BadSegment> {
-        let file = open_shared(&path_of(node, name), false)?;
+    pub(crate) fn open(node: &Directory, name: Name) -> Result<Self, BadSegment> {
+        let file = node.open_file(&file_name(name)).map_err(|error| BadSegment::of_open(WHAT, error))?;
         let shape = Self::identify(&file, name)?;
         Ok(Self::new(&mapped::mapping(&file, shape.segment_bytes())?, name, shape, true))
     }
 
     /// Maps its page and words, to look at: no body is read, and so none of its pages need be brought in.
-    pub(crate) fn look_at(node: &Path, name: Name) -> Result<(Self, File), BadSegment> {
-        let file = open_to_read(&path_of(node, name))?;
+    pub(crate) fn look_at(node: &Directory, name: Name) -> Result<(Self, File), BadSegment> {
+        let file = node.open_to_read(&file_name(name)).map_err(|error| BadSegment::of_open(WHAT, error))?;
         let shape = Self::identify(&file, name)?;
         Ok((Self::new(&Mapping::new(&file, shape.slots_offset(), Use::Look)?, name, shape, false), file))
     }
@@ -91,7 +91,7 @@ impl Segment {
     /// What a file says that it is. Read, not mapped: a map costs more than all of the rest.
     fn identify(file: &File, name: Name) -> Result<Shape, BadSegment> {
         let there = file.metadata()?;
-        if !there.is_file() || there.len() < size_of::<Page>() as u64 {
+        if there.len() < size_of::<Page>() as u64 {
             return Err(BadFile::Foreign(WHAT).into());
         }
         let mut first = [0; size_of::<Identity>()];

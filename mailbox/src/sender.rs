@@ -103,14 +103,14 @@ fn open(participant: &Participant, name: Name, reach: Reach) -> Result<Segment, 
     if reach == Reach::Here {
         return Err(SendError::NoMailbox(name));
     }
-    let route = routes::find(participant.node().path(), name).map_err(|text| SendError::Bad(name, text))?;
+    let route = routes::find(participant.node().directory(), name).map_err(|text| SendError::Bad(name, text))?;
     let router = route.ok_or(SendError::NoMailbox(name))?;
     open_here(participant, router)?.ok_or(SendError::NoRouter { name, router })
 }
 
 /// A mailbox of this node, if there is one of this name.
 fn open_here(participant: &Participant, name: Name) -> Result<Option<Segment>, SendError> {
-    match Segment::open(participant.node().path(), name) {
+    match Segment::open(participant.node().directory(), name) {
         Ok(segment) => Ok(Some(segment)),
         Err(BadSegment::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(SendError::Bad(name, error.to_string())),
@@ -252,7 +252,7 @@ impl Sender {
     #[cold]
     fn look_again(&mut self) -> Result<(), SendError> {
         let epoch = self.participant.node().registry_epoch();
-        let node = self.participant.node().path();
+        let node = self.participant.node().directory();
         let router = || routes::find(node, self.to).ok().flatten().filter(|router| *router != self.segment.name);
         let better = match open_here(&self.participant, self.to)? {
             None => router().map(|router| open_here(&self.participant, router)).transpose()?.flatten(),

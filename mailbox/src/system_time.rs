@@ -11,15 +11,16 @@ pub use keeper::TimeKeeper;
 
 use crate::cell::SeqLatch;
 use crate::clock::{monotonic_ns, realtime_ns, slept_ns, slept_ns_min};
-use crate::files::{allocate, open_shared};
+use crate::files::{Directory, allocate};
 use crate::memory::{Mapping, Shared, Use};
 use crate::node::Node;
 use crate::step::step;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
+/// The file of the page.
+const FILE: &str = "time";
 /// A reader tries again so often when the writer wrote twice meanwhile: the writer writes at most some thousand times a
 /// second, a reading takes less than a microsecond.
 const READ_TRIES: usize = 8;
@@ -238,8 +239,8 @@ impl TimePage {
     }
 }
 
-fn map(node: &Path, create: bool) -> std::io::Result<Mapping> {
-    let file = open_shared(&node.join("time"), create)?;
+fn map(node: &Directory, create: bool) -> std::io::Result<Mapping> {
+    let file = if create { node.open_or_make(FILE)? } else { node.open_to_read(FILE)? };
     let bytes = size_of::<TimePage>();
     if create && file.metadata()?.len() < bytes as u64 {
         allocate(&file, bytes)?;
@@ -256,7 +257,7 @@ pub struct SystemClock {
 impl SystemClock {
     /// Opens the node's time page, if there is one.
     pub fn open(node: &Node) -> Self {
-        Self { mapping: map(node.path(), false).ok().map(Arc::new) }
+        Self { mapping: map(node.directory(), false).ok().map(Arc::new) }
     }
 
     /// System time now. No system call, lock or heap.

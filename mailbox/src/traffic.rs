@@ -12,18 +12,18 @@
 //! tells no times. A value published that finds none is not counted, since it is no package; those that carry it to
 //! subscribers are. A new participant of the same index makes a new file: readers of the old one are not confused.
 
+use crate::beside::unfinished;
 use crate::cell::SeqCount;
-use crate::files::{allocate, open_shared, open_to_read};
+use crate::files::{Directory, allocate};
 use crate::layout::{MAGIC, VERSION};
 use crate::memory::{Located, Mapping, Shared, Use};
 use crate::name::Name;
-use crate::node::{Node, NodeError};
+use crate::node::Node;
+use crate::node_error::NodeError;
 use crate::package::Type;
 use crate::step::step;
 use crate::word::Claimant;
-use std::fs;
 use std::mem::offset_of;
-use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Rows of a participant; the last takes the rest.
@@ -116,24 +116,24 @@ impl Key {
 /// A participant's table, which only it writes.
 pub(crate) struct Table {
     page: Located<TrafficPage>,
-    path: PathBuf,
+    /// Its name.
+    file: String,
     /// Numbers its writers.
     writers: AtomicU32,
 }
 
-pub(crate) fn path_of(node: &Path, participant: u16) -> PathBuf {
-    node.join(format!("traffic.{participant}"))
+fn file_name(participant: u16) -> String {
+    format!("traffic.{participant}")
 }
 
 impl Table {
     /// Makes the file, whole, in place of what an earlier participant of this index left. The caller holds the index's
     /// lock.
     pub(crate) fn make(node: &Node, me: Claimant) -> Result<Self, NodeError> {
-        let path = path_of(node.path(), me.participant);
-        let unfinished = path.with_extension(format!("{}.new", me.participant));
+        let name = file_name(me.participant);
+        let (directory, unfinished) = (node.directory(), unfinished(&name));
         let made = || {
-            let _ = fs::remove_file(&unfinished);
-            let file = open_shared(&unfinished, true)?;
+            let file = directory.make_anew(&unfinished)?;
             step!("traffic: file");
             allocate(&file, size_of::<TrafficPage>())?;
             let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Keep)?;
@@ -145,22 +145,22 @@ impl Table {
             header.rows.store(FLOWS as u32, Ordering::Relaxed);
             header.magic.store(MAGIC, Ordering::Release);
             step!("traffic: formatted");
-            fs::rename(&unfinished, &path)?;
+            directory.rename(&unfinished, &name)?;
             step!("traffic: named");
             Ok(page)
         };
         match made() {
-            Ok(page) => Ok(Self { page, path, writers: AtomicU32::new(0) }),
+            Ok(page) => Ok(Self { page, file: name, writers: AtomicU32::new(0) }),
             Err(error) => {
-                let _ = fs::remove_file(&unfinished);
-                Err(NodeError::of(&path, error))
+                let _ = directory.remove(&unfinished);
+                Err(NodeError::of(&node.path().join(name), error))
             }
         }
     }
 
     /// Takes the file's name away. The caller holds the index's lock, in this very directory.
-    pub(crate) fn remove(&self) {
-        let _ = fs::remove_file(&self.path);
+    pub(crate) fn remove(&self, node: &Node) {
+        let _ = node.directory().remove(&self.file);
     }
 
     fn rows(&self) -> &[FlowRow; FLOWS] {
@@ -227,8 +227,8 @@ pub(crate) struct TableView(Located<TrafficPage>);
 
 impl TableView {
     /// The table of this participant, if it is there, whole, and of this use of the index.
-    pub(crate) fn open(node: &Path, claimant: Claimant) -> Option<Self> {
-        let file = open_to_read(&path_of(node, claimant.participant)).ok()?;
+    pub(crate) fn open(node: &Directory, claimant: Claimant) -> Option<Self> {
+        let file = node.open_to_read(&file_name(claimant.participant)).ok()?;
         let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Look).ok()?;
         let page = mapping.locate::<TrafficPage>(0);
         let header = &page.header;

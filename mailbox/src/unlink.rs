@@ -2,20 +2,21 @@
 
 use crate::about;
 use crate::name::Name;
-use crate::node::{Node, NodeError, RegistryLock};
-use crate::segment::path_of;
+use crate::node::{Node, RegistryLock};
+use crate::node_error::NodeError;
+use crate::segment::file_name;
 use crate::step::step;
-use std::fs;
 
 /// Takes a mailbox's name away; the caller owns it.
 pub(crate) fn remove(node: &Node, name: Name) -> Result<(), NodeError> {
-    unlink(node, name, &RegistryLock::take(node.path())?)
+    unlink(node, name, &RegistryLock::take(node.directory())?)
 }
 
 /// The same for a caller that holds the lock of the registry.
 pub(crate) fn unlink(node: &Node, name: Name, _registry: &RegistryLock) -> Result<(), NodeError> {
     about::remove(node, name);
-    fs::remove_file(path_of(node.path(), name)).map_err(|error| NodeError::Io(path_of(node.path(), name), error))?;
+    let file = file_name(name);
+    node.directory().remove(&file).map_err(|error| NodeError::Io(node.path().join(file), error))?;
     step!("unlink: gone");
     node.raise_registry_epoch();
     Ok(())

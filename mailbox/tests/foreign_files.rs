@@ -11,7 +11,7 @@ use rohrpost_mailbox::{
 };
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::FileTypeExt;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
 
 /// What may stand in a file's place.
@@ -92,6 +92,32 @@ fn what_is_no_node_is_refused_and_left_as_it_is() {
         assert!(Node::open(ground.path()).is_ok_and(|node| node.participants().is_empty()));
         drop(ground.join());
     }
+}
+
+#[test]
+fn a_file_that_is_written_whole_overwrites_nothing_but_itself() {
+    let ground = Ground::new();
+    let node = Node::create(ground.path(), 0o770).unwrap();
+    let victim = ground.path().with_file_name("of a user");
+    fs::write(&victim, "kept").unwrap();
+    for name in ["notes", "notes.new"] {
+        let at = ground.path().join(name);
+        for thing in [Thing::Pipe, Thing::Bytes(garbage(3_000_000))] {
+            thing.put(&at);
+            assert!(name == "notes.new" || node.read_file("notes").is_err(), "{thing:.40?} is read");
+            node.put_file("notes", b"words").unwrap();
+            assert_eq!(node.read_file("notes").unwrap().unwrap(), b"words");
+            fs::remove_file(ground.path().join("notes")).unwrap();
+        }
+        std::os::unix::fs::symlink(&victim, &at).unwrap();
+        assert!(name == "notes.new" || node.read_file("notes").is_err(), "a link is followed");
+        node.put_file("notes", b"words").unwrap();
+        assert_eq!(fs::read_to_string(&victim).unwrap(), "kept", "{name}");
+        let made = fs::symlink_metadata(ground.path().join("notes")).unwrap();
+        assert!(made.is_file() && made.mode() & 0o777 == 0o660, "{name}: {:o}", made.mode());
+        fs::remove_file(ground.path().join("notes")).unwrap();
+    }
+    assert_eq!(node.read_file("notes").unwrap(), None);
 }
 
 #[test]

@@ -49,6 +49,7 @@ mod new;
 mod nodes;
 mod once;
 mod once_wrap;
+mod other_users;
 mod output;
 mod output_log;
 mod param;

@@ -115,6 +115,8 @@ pub(super) enum NodeDirectory {
     Dead,
     /// It was created by a program with another layout version.
     OtherVersion(u32),
+    /// Another user made it.
+    Foreign(String),
     /// It cannot be read.
     Unreadable(String),
 }
@@ -253,6 +255,7 @@ fn seen(path: &Path) -> NodeDirectory {
             None => NodeDirectory::InUse,
         },
         Err(NodeError::Version(_, version)) => NodeDirectory::OtherVersion(version),
+        Err(error @ NodeError::Foreign(..)) => NodeDirectory::Foreign(error.to_string()),
         Err(error) => NodeDirectory::Unreadable(error.to_string()),
     }
 }

@@ -223,6 +223,10 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
                 why,
                 format!("stop the node (with the program that launched it), then rm -r {path}"),
             ),
+            NodeDirectory::Foreign(error) => {
+                let why = "programs leave it alone, and a node of this name cannot be launched";
+                Finding::not(Grade::Warn, what, error.clone(), why, format!("sudo rm -r {path}"))
+            }
             NodeDirectory::Unreadable(error) => {
                 Finding::not(Grade::Warn, what, error.clone(), why, format!("rm -r {path}, if nothing uses it"))
             }

@@ -4,7 +4,7 @@ use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use super::machine::{Bridge, KernelFacts, NodeDirectory, NodeFound, StreamsFound};
 use super::protection::{LanProtection, Tcp};
 use super::*;
-use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
+use rohrpost_mailbox::{LAYOUT_VERSION, NodeError, sys::Room};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
@@ -39,6 +39,8 @@ fn compare(name: &str, said: &str) {
     assert_eq!(said, fs::read_to_string(&golden).unwrap(), "{}", golden.display());
 }
 
+/// A node directory of another user.
+const THEIRS: &str = "/home/robot/nodes/theirs.main";
 const PORTS: [&str; 3] = ["port of packages", "port of time", "port of the rest"];
 
 fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> LanView {
@@ -119,6 +121,7 @@ fn bad() -> (KernelFacts, Needs) {
         nodes: vec![
             node("/home/robot/nodes/demo.main", NodeDirectory::Dead, 1),
             node("/home/robot/nodes/old.main", NodeDirectory::OtherVersion(99), 0),
+            node(THEIRS, NodeDirectory::Foreign(NodeError::Foreign(THEIRS.into(), 1001).to_string()), 0),
         ],
         bridge: None,
         viewer: None,

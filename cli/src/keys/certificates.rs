@@ -9,12 +9,12 @@ use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose,
     date_time_ymd,
 };
-use rohrpost_config::{Installation, check_secret};
+use rohrpost_config::{Installation, open_secret};
 use rohrpost_mailbox::realtime_ns;
 use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, is_about};
 pub(crate) use shown::lacking;
 pub(super) use shown::show;
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -118,14 +118,14 @@ struct Signing {
 fn signing(folder: &Path, installation: &Installation) -> Result<Signing, CertificateError> {
     let [certificate, secret] = files(folder, AUTHORITY);
     let file = || installation.shown.clone();
-    let key = match File::open(&secret) {
+    let failed = |error| CertificateError::File(secret.clone(), error);
+    let key = match open_secret(&secret, failed) {
         Ok(file) => {
-            check_secret(&secret, &file)?;
-            let text = io::read_to_string(file).map_err(|error| CertificateError::File(secret.clone(), error))?;
+            let text = io::read_to_string(file).map_err(failed)?;
             Some(KeyPair::from_pem(&text).map_err(|error| CertificateError::Unfit(secret.clone(), error))?)
         }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-        Err(error) => return Err(CertificateError::File(secret, error)),
+        Err(CertificateError::File(_, error)) if error.kind() == io::ErrorKind::NotFound => None,
+        Err(error) => return Err(error),
     };
     if certificate.exists() {
         let authority = Authority::load(&certificate)?;

@@ -206,6 +206,11 @@ fn a_failed_write_changes_nothing() {
     }
     std::fs::remove_dir(&in_the_way).unwrap();
     assert_eq!(shown(place.path()), first);
+    std::fs::write(&in_the_way, "a user's").unwrap();
+    assert!(step(rotate, &file).unwrap_err().contains("tcp-router.pem.new: this was left"));
+    assert_eq!(std::fs::read_to_string(&in_the_way).unwrap(), "a user's");
+    std::fs::remove_file(&in_the_way).unwrap();
+    assert_eq!(shown(place.path()), first);
     // Each earlier authority is kept, even after another new start.
     step(begin_anew, &file).unwrap();
     let second = shown(place.path());

@@ -17,7 +17,10 @@ pub(super) const FOLDERS_DEEP: usize = 8;
 /// # Errors
 /// When there is no thread.
 pub(super) fn recover(directory: &Path, stem: &str, leave_bytes: u64) -> io::Result<()> {
-    let files = files(directory, stem);
+    let Found { files, others } = find(directory, stem);
+    for other in others {
+        tracing::warn!("{} is passed over: it is no regular file, and a recording is one", other.display());
+    }
     if files.is_empty() {
         return Ok(());
     }
@@ -28,22 +31,37 @@ pub(super) fn recover(directory: &Path, stem: &str, leave_bytes: u64) -> io::Res
 /// Files of recordings of a stem, in order, also in folders that log control led to; none of a folder that cannot be
 /// read, which the writer will tell.
 pub(super) fn files(directory: &Path, stem: &str) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    collect(directory, stem, FOLDERS_DEEP, &mut files);
-    files.sort();
-    files
+    find(directory, stem).files
+}
+
+/// What has the name of a file of a recording.
+#[derive(Default)]
+struct Found {
+    files: Vec<PathBuf>,
+    /// Pipes, links and the like: reading them may wait for ever, or lead elsewhere.
+    others: Vec<PathBuf>,
+}
+
+fn find(directory: &Path, stem: &str) -> Found {
+    let mut found = Found::default();
+    collect(directory, stem, FOLDERS_DEEP, &mut found);
+    found.files.sort();
+    found.others.sort();
+    found
 }
 
 /// Links are not followed: what they lead to is there by its own name, or outside.
-fn collect(directory: &Path, stem: &str, deep: usize, files: &mut Vec<PathBuf>) {
+fn collect(directory: &Path, stem: &str, deep: usize, found: &mut Found) {
     for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
         let path = entry.path();
-        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+        // It went meanwhile.
+        let Ok(kind) = entry.file_type() else { continue };
+        if kind.is_dir() {
             if deep > 0 {
-                collect(&path, stem, deep - 1, files);
+                collect(&path, stem, deep - 1, found);
             }
         } else if path.file_name().and_then(OsStr::to_str).is_some_and(|name| is_file(name, stem)) {
-            files.push(path);
+            if kind.is_file() { &mut found.files } else { &mut found.others }.push(path);
         }
     }
 }
@@ -112,6 +130,20 @@ mod tests {
         std::fs::write(below.join("arm-0001.mcap"), "").unwrap();
         assert_eq!(files(place.path(), "base"), wanted);
         assert!(files(&place.path().join("gone"), "base").is_empty());
+    }
+
+    #[test]
+    fn a_pipe_among_recordings_is_named_and_waited_for_by_nobody() {
+        let place = tempfile::tempdir().unwrap();
+        let [pipe, file] = ["base-0001.mcap", "base-0002.mcap"].map(|name| place.path().join(name));
+        nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+        std::fs::write(&file, "").unwrap();
+        let found = find(place.path(), "base");
+        assert_eq!((found.files, found.others), (vec![file], vec![pipe.clone()]));
+        // It may come later than the look.
+        assert!(!is_being_written(&pipe) && !is_leftover(&pipe));
+        let told = recovered(&pipe, &recovered_path(&pipe), &mut |_, _| {}).unwrap_err().to_string();
+        assert!(told.contains("base-0001.mcap: cannot read: it is no regular file"), "{told}");
     }
 
     #[test]

@@ -2,11 +2,11 @@
 
 use crate::terminal::{Failure, say};
 use rohrpost::schema::{Value, decode};
-use rohrpost_recording::{Message, RecordedChannel};
+use rohrpost_recording::{Message, PartFile, RecordedChannel};
 use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A message. Numbers that JSON does not have are texts in its value: `"NaN"`, `"inf"`, `"-inf"`.
 #[derive(Serialize)]
@@ -51,11 +51,9 @@ pub(super) enum JsonLines {
 /// A file in the making. It gets its name once it is whole; dropped before, it leaves nothing.
 pub(super) struct JsonFile {
     out: BufWriter<File>,
-    part: PathBuf,
-    to: PathBuf,
+    part: PartFile,
     messages: u64,
     bytes: u64,
-    is_whole: bool,
 }
 
 impl JsonLines {
@@ -64,17 +62,8 @@ impl JsonLines {
         if to == Path::new("-") {
             return Ok(Self::Stdout);
         }
-        if to.symlink_metadata().is_ok() {
-            return Err(format!("{}: is there already; remove it, or name another file", to.display()).into());
-        }
-        let mut part = to.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        // What an interrupted one left. Not through a link, which `create_new` would refuse, too.
-        let _ = std::fs::remove_file(&part);
-        let file = File::create_new(&part).map_err(|error| format!("{}: {error}", part.display()))?;
-        let out = BufWriter::new(file);
-        Ok(Self::File(JsonFile { out, part, to: to.to_owned(), messages: 0, bytes: 0, is_whole: false }))
+        let (part, file) = PartFile::create(to, |path| File::create_new(path))?;
+        Ok(Self::File(JsonFile { out: BufWriter::new(file), part, messages: 0, bytes: 0 }))
     }
 
     /// Writes a message; false when nobody reads any more.
@@ -83,7 +72,7 @@ impl JsonLines {
         match self {
             Self::Stdout => Ok(say(line)),
             Self::File(file) => {
-                file.add(&line).map_err(|error| format!("{}: {error}", file.part.display()))?;
+                file.add(&line).map_err(|error| format!("{}: {error}", file.part.path().display()))?;
                 Ok(true)
             }
         }
@@ -92,7 +81,8 @@ impl JsonLines {
     /// Ends it; messages and bytes of a file.
     pub(super) fn finish(self) -> Result<Option<(u64, u64)>, Failure> {
         let Self::File(mut file) = self else { return Ok(None) };
-        file.finish().map_err(|error| format!("{}: {error}", file.to.display()))?;
+        file.flush().map_err(|error| format!("{}: {error}", file.part.path().display()))?;
+        file.part.finish()?;
         Ok(Some((file.messages, file.bytes)))
     }
 }
@@ -105,20 +95,9 @@ impl JsonFile {
         Ok(())
     }
 
-    fn finish(&mut self) -> io::Result<()> {
+    fn flush(&mut self) -> io::Result<()> {
         self.out.flush()?;
-        self.out.get_ref().sync_all()?;
-        std::fs::rename(&self.part, &self.to)?;
-        self.is_whole = true;
-        Ok(())
-    }
-}
-
-impl Drop for JsonFile {
-    fn drop(&mut self) {
-        if !self.is_whole {
-            let _ = std::fs::remove_file(&self.part);
-        }
+        self.out.get_ref().sync_all()
     }
 }
 
@@ -179,6 +158,18 @@ mod tests {
         assert_eq!(told, format!(r#"{head}"value":{{"ranges":[1.5,"NaN","inf","-inf"]}}}}"#));
         let told = line(&channel(Some(ty), "postcard"), &data[1..]);
         assert!(told.starts_with(&format!(r#"{head}"unreadable":""#)) && told.contains(r#""hex":"00c03f"#), "{told}");
+    }
+
+    #[test]
+    fn no_file_of_a_user_is_taken_for_a_temporary_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let [to, part] = ["out.jsonl", "out.jsonl.part"].map(|name| folder.path().join(name));
+        std::fs::write(&part, "a user's").unwrap();
+        drop(JsonLines::create(&to).unwrap());
+        assert_eq!(JsonLines::create(&to).unwrap().finish().unwrap(), Some((0, 0)));
+        assert_eq!(std::fs::read_to_string(&part).unwrap(), "a user's");
+        assert!(JsonLines::create(&to).err().unwrap().to_string().contains("is there already"));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[test]

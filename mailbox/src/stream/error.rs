@@ -2,7 +2,7 @@
 
 use crate::files::{is_lack_of_descriptors, is_lack_of_memory};
 use crate::name::Name;
-use crate::node::NodeError;
+use crate::node_error::NodeError;
 use crate::owned::{BadFile, BadSegment};
 use crate::stream::shape::{StreamId, StreamShapeError};
 use std::io;

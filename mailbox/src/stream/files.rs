@@ -1,11 +1,11 @@
 //! Which streams a node has, and removing those that nobody writes.
 
-use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock};
+use crate::node::{Node, RegistryLock};
+use crate::node_error::{NodeError, REGISTRY_PATIENCE};
 use crate::owned;
 use crate::step::step;
-use crate::stream::segment::{StreamSegment, id_of, path_of};
+use crate::stream::segment::{StreamSegment, file_name, id_of};
 use crate::stream::shape::StreamId;
-use std::fs;
 use std::time::Duration;
 
 impl Node {
@@ -15,8 +15,8 @@ impl Node {
     /// When its directory cannot be read.
     pub fn streams(&self) -> Result<Vec<StreamId>, NodeError> {
         let failed = |error| NodeError::Io(self.path().into(), error);
-        let entries = fs::read_dir(self.path()).map_err(failed)?;
-        let mut streams: Vec<_> = entries.filter_map(|entry| id_of(&entry.ok()?.path())).collect();
+        let files = self.directory().names().map_err(failed)?;
+        let mut streams: Vec<_> = files.filter_map(|file| id_of(&file)).collect();
         streams.sort();
         Ok(streams)
     }
@@ -35,10 +35,10 @@ impl Node {
     /// # Errors
     /// When the node's directory cannot be changed.
     pub fn remove_orphan_stream_within(&self, id: StreamId, patience: Duration) -> Result<bool, NodeError> {
-        let _registry = RegistryLock::take_within(self.path(), patience)?;
+        let _registry = RegistryLock::take_within(self.directory(), patience)?;
         owned::remove_orphan::<StreamSegment>(self, id, || {
-            let path = path_of(self.path(), id);
-            fs::remove_file(&path).map_err(|error| NodeError::Io(path, error))?;
+            let file = file_name(id);
+            self.directory().remove(&file).map_err(|error| NodeError::Io(self.path().join(file), error))?;
             step!("unlink: ring gone");
             self.raise_registry_epoch();
             Ok(())

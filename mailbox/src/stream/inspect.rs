@@ -13,7 +13,7 @@ use crate::stream::missed::Missed;
 use crate::stream::omission::LeftOut;
 use crate::stream::record::RecordInfo;
 use crate::stream::ring::Seat;
-use crate::stream::segment::{StreamSegment, path_of};
+use crate::stream::segment::{StreamSegment, file_name};
 use crate::stream::shape::{StreamId, StreamShape};
 use std::fs::File;
 use std::io;
@@ -71,10 +71,10 @@ impl Node {
     /// # Errors
     /// When its file cannot be used, or is something else.
     pub fn inspect_stream(&self, id: StreamId) -> Result<Option<StreamInfo>, StreamError> {
-        let (segment, file) = match StreamSegment::open(self.path(), id) {
+        let (segment, file) = match StreamSegment::open(self.directory(), id) {
             Ok(opened) => opened,
             Err(BadSegment::Io(error)) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(why) => return Err(StreamError::of_bad(&path_of(self.path(), id), id, why)),
+            Err(why) => return Err(StreamError::of_bad(&self.path().join(file_name(id)), id, why)),
         };
         let (says, ring) = (&segment.page().writer, segment.ring());
         // The first byte is the writer's. What a dead reader left in its seat says nothing any more.

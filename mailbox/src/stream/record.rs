@@ -7,7 +7,7 @@ use crate::step::step;
 use crate::stream::error::StreamError;
 use crate::stream::place::RecordPlace;
 use crate::stream::ring::{Line, Ring, Stamp};
-use crate::stream::segment::{StreamSegment, path_of};
+use crate::stream::segment::{StreamSegment, file_name};
 use crate::stream::shape::StreamId;
 use std::io;
 use std::os::unix::fs::MetadataExt;
@@ -104,8 +104,8 @@ impl TakenSeat {
         instead_of: Option<&Self>,
     ) -> Result<Option<Self>, StreamError> {
         let node = participant.node();
-        let path = path_of(node.path(), id);
-        let (segment, file) = match StreamSegment::open(node.path(), id) {
+        let path = node.path().join(file_name(id));
+        let (segment, file) = match StreamSegment::open(node.directory(), id) {
             Ok(opened) => opened,
             Err(BadSegment::Io(error)) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(why) => return Err(StreamError::of_bad(&path, id, why)),

@@ -12,7 +12,7 @@
 
 use crate::about;
 use crate::name::Name;
-use crate::node::{NodeError, REGISTRY_PATIENCE};
+use crate::node_error::{NodeError, REGISTRY_PATIENCE};
 use crate::participant::Participant;
 use crate::stream::error::{ReplicaError, StreamError};
 use crate::stream::record::RecordInfo;

@@ -1,6 +1,6 @@
 //! A stream's file, mapped and checked, and the bytes of its records.
 
-use crate::files::open_shared;
+use crate::files::Directory;
 use crate::layout::PAGE;
 use crate::memory::{Located, Mapping, Pages, Rooms, Use};
 use crate::name::Name;
@@ -15,7 +15,7 @@ use crate::sync::prefetch_to_write;
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A stream's memory. What it is was checked when it was mapped and is not read again.
@@ -33,22 +33,22 @@ pub(crate) struct StreamSegment {
 }
 
 /// The file of a stream.
-pub(crate) fn path_of(node: &Path, id: StreamId) -> PathBuf {
-    node.join(format!("{:08x}.{}.ring", id.name.raw(), id.number))
+pub(crate) fn file_name(id: StreamId) -> String {
+    format!("{:08x}.{}.ring", id.name.raw(), id.number)
 }
 
-/// The stream a file of a node's directory belongs to.
+/// The stream a file of this name belongs to.
 pub(crate) fn id_of(path: &Path) -> Option<StreamId> {
-    let (name, number) = path.file_name()?.to_str()?.strip_suffix(".ring")?.split_once('.')?;
+    let (name, number) = path.to_str()?.strip_suffix(".ring")?.split_once('.')?;
     let id = StreamId { name: Name::from_raw(u32::from_str_radix(name, 16).ok()?), number: number.parse().ok()? };
     // A stream has exactly one file.
-    (path.file_name() == path_of(Path::new(""), id).file_name()).then_some(id)
+    (path == Path::new(&file_name(id))).then_some(id)
 }
 
 impl StreamSegment {
     /// The stream as it stands, to read there; its file, to lock a seat of.
-    pub(crate) fn open(node: &Path, id: StreamId) -> Result<(Self, File), BadSegment> {
-        let file = open_shared(&path_of(node, id), false)?;
+    pub(crate) fn open(node: &Directory, id: StreamId) -> Result<(Self, File), BadSegment> {
+        let file = node.open_file(&file_name(id)).map_err(|error| BadSegment::of_open(Self::WHAT, error))?;
         Ok((Self::map(&file, id, Self::identify(&file, id)?, Use::Look)?, file))
     }
 
@@ -82,7 +82,7 @@ impl StreamSegment {
     /// What a file says that it is. Read, not mapped.
     fn identify(file: &File, id: StreamId) -> Result<StreamShape, BadSegment> {
         let there = file.metadata()?;
-        if !there.is_file() || there.len() < PAGE as u64 {
+        if there.len() < PAGE as u64 {
             return Err(BadFile::Foreign(Self::WHAT).into());
         }
         let mut first = [0; size_of::<StreamIdentity>()];
@@ -212,8 +212,8 @@ impl Owned for StreamSegment {
     /// With where it begins, if not behind what was there before: a replica has the sequences of its origin.
     type Shape = (StreamShape, Option<u64>);
 
-    fn path(node: &Path, id: StreamId) -> PathBuf {
-        path_of(node, id)
+    fn file_name(id: StreamId) -> String {
+        file_name(id)
     }
 
     fn bytes((shape, _): &Self::Shape) -> usize {

@@ -4,7 +4,8 @@ use crate::clock::monotonic_ns;
 use crate::doorbell;
 use crate::lock::Held;
 use crate::name::Name;
-use crate::node::{NodeError, REGISTRY_PATIENCE, RegistryLock};
+use crate::node::RegistryLock;
+use crate::node_error::{NodeError, REGISTRY_PATIENCE};
 use crate::owned::{self, Refused};
 use crate::participant::Participant;
 use crate::step::step;
@@ -79,7 +80,7 @@ impl Participant {
         }
         shape.check().map_err(|error| StreamError::Shape(id, error))?;
         let (node, shape) = (self.node(), shape.as_stored());
-        let registry = RegistryLock::take_within(node.path(), patience).map_err(|error| match error {
+        let registry = RegistryLock::take_within(node.directory(), patience).map_err(|error| match error {
             NodeError::Descriptors(_) => StreamError::Descriptors(id),
             error => StreamError::Node(error),
         })?;

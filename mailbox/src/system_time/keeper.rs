@@ -1,9 +1,10 @@
 //! The writer of a node's system time.
 
-use super::{BILLION, ERROR_UNKNOWN_NS, TimePage, TimeRecord, TimeSource, Watched, Written, map};
+use super::{BILLION, ERROR_UNKNOWN_NS, FILE, TimePage, TimeRecord, TimeSource, Watched, Written, map};
 use crate::clock::{monotonic_ns, realtime_ns, slept_ns};
 use crate::memory::Mapping;
-use crate::node::{Node, NodeError};
+use crate::node::Node;
+use crate::node_error::NodeError;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -30,8 +31,8 @@ impl TimeKeeper {
     /// # Errors
     /// When the page cannot be made.
     pub fn begin(node: &Arc<Node>, source: TimeSource, system_ns: u64, pace: f64) -> Result<Self, NodeError> {
-        let failed = |error| NodeError::of(&node.path().join("time"), error);
-        let keeper = Self { mapping: map(node.path(), true).map_err(failed)?, watched: None };
+        let failed = |error| NodeError::of(&node.path().join(FILE), error);
+        let keeper = Self { mapping: map(node.directory(), true).map_err(failed)?, watched: None };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
         let epoch = page.read().map_or(1, |last| last.record.epoch.saturating_add(1));
@@ -94,8 +95,8 @@ impl TimeKeeper {
     /// # Errors
     /// When the page cannot be made.
     pub fn resume(node: &Arc<Node>) -> Result<Self, NodeError> {
-        let failed = |error| NodeError::of(&node.path().join("time"), error);
-        let keeper = Self { mapping: map(node.path(), true).map_err(failed)?, watched: None };
+        let failed = |error| NodeError::of(&node.path().join(FILE), error);
+        let keeper = Self { mapping: map(node.directory(), true).map_err(failed)?, watched: None };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
         Ok(keeper)

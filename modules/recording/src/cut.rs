@@ -1,10 +1,10 @@
 //! A part of a recording: a time range, some names.
 
-use crate::error::ReadError;
+use crate::error::{ReadError, RewriteError};
 use crate::format::metadata;
 use crate::read::before::newest_before;
 use crate::read::selected::Selected;
-use crate::rewrite::{Progress, RewriteError, Rewriter};
+use crate::rewrite::{Progress, Rewriter};
 use crate::selection::{SelectError, Selection};
 use mcap::records::MessageHeader;
 use std::path::Path;

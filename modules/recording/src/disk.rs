@@ -3,7 +3,7 @@
 use nix::sys::statvfs::statvfs;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::Path;
 use std::time::Duration;
 
@@ -42,7 +42,16 @@ pub(crate) trait DiskFile: Send {
 /// nobody can tell.
 pub fn is_being_written(path: &Path) -> bool {
     // A shared one: network file systems give no other for a file that is read.
-    File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    open_to_read(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
+/// Opens a regular file, of which a recording consists. A pipe of its name would be waited for, for ever.
+pub(crate) fn open_to_read(path: &Path) -> io::Result<File> {
+    let file = OpenOptions::new().read(true).custom_flags(nix::libc::O_NONBLOCK).open(path)?;
+    if file.metadata()?.is_file() {
+        return Ok(file);
+    }
+    Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file; name a file of a recording (*.mcap)"))
 }
 
 /// Takes the lock by which others see that the file is being written, as long as it is open. A reader that looks just

@@ -102,6 +102,17 @@ impl DiskError {
     }
 }
 
+/// Why there is no new file.
+#[derive(Debug, Error)]
+pub enum RewriteError {
+    /// Nothing is overwritten.
+    #[error("{0}: is there already; remove it, or name another file")]
+    Exists(Shown),
+    /// The disk does not take it.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+}
+
 /// A path in a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shown(pub PathBuf);

@@ -1,6 +1,6 @@
 //! One MCAP file that is being written: chunks go to it whole, and what fails is taken back to the last whole one.
 
-use crate::disk::Disk;
+use crate::disk::{Disk, DiskFile};
 use crate::error::{DiskError, Shown};
 use crate::format::{LIBRARY, PROFILE};
 use crate::output::Output;
@@ -27,6 +27,11 @@ impl OpenFile {
     /// Makes a new one.
     pub(crate) fn create(disk: &mut dyn Disk, path: &Path) -> Result<Self, DiskError> {
         let file = disk.create(path).map_err(|error| DiskError::new("make the file", path, error))?;
+        Self::begin(disk, path, file)
+    }
+
+    /// Begins a file that was just made there.
+    pub(crate) fn begin(disk: &mut dyn Disk, path: &Path, file: Box<dyn DiskFile>) -> Result<Self, DiskError> {
         let output = Output::new(file);
         // A chunk is put together in memory and written with its length. While `mcap` seeks, an open chunk has none:
         // readers stop before it if the writer is killed.

@@ -1,12 +1,12 @@
 //! Several files in one, by time of arrival.
 
-use crate::error::{ReadError, Shown};
+use crate::error::{ReadError, RewriteError, Shown};
 use crate::format::{self, key, metadata};
 use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::{Definition, Definitions, SchemaText};
 use crate::read::frames::Frames;
 use crate::read::index::Index;
-use crate::rewrite::{Progress, RewriteError, Rewriter};
+use crate::rewrite::{Progress, Rewriter};
 use mcap::records::Metadata;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,10 @@
 //! A whole file from one that was not closed, or is damaged.
 
 use crate::disk::is_being_written;
-use crate::error::{Damage, ReadError, Shown};
+use crate::error::{Damage, ReadError, RewriteError, Shown};
 use crate::format::metadata;
 use crate::read::contents::{Contents, Ending, Item};
-use crate::rewrite::{Progress, RewriteError, Rewriter};
+use crate::rewrite::{Progress, Rewriter};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use thiserror::Error;

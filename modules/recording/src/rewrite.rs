@@ -1,36 +1,25 @@
-//! A new file from what others have. It gets its name once it is whole; before, it is called `NAME.part`.
+//! A new file from what others have. It gets its name once it is whole.
 
-use crate::disk::RealDisk;
-use crate::error::{DiskError, Shown};
+use crate::disk::{Disk, RealDisk};
+use crate::error::{DiskError, RewriteError};
 use crate::file::OpenFile;
 use crate::format::{CHUNK_BYTES_MAX, MESSAGE_OVERHEAD_BYTES};
+use crate::part_file::PartFile;
 use crate::read::definitions::Definition;
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
-use thiserror::Error;
 
 /// Told now and then how many bytes are read, and of how many.
 pub type Progress<'a> = dyn FnMut(u64, u64) + 'a;
 
-/// Why there is no new file.
-#[derive(Debug, Error)]
-pub enum RewriteError {
-    /// Nothing is overwritten.
-    #[error("{0}: is there already; remove it, or name another file")]
-    Exists(Shown),
-    /// The disk does not take it.
-    #[error(transparent)]
-    Disk(#[from] DiskError),
-}
-
 /// A file in the making. Dropped before its end, it leaves nothing.
 pub(crate) struct Rewriter {
-    /// None once it has its name.
+    /// None once it is closed.
     file: Option<OpenFile>,
-    part: PathBuf,
-    to: PathBuf,
+    /// None once it has its name.
+    part: Option<PartFile>,
     /// Channels by source and number there.
     channels: BTreeMap<(usize, u16), u16>,
     chunk_bytes: usize,
@@ -40,16 +29,9 @@ pub(crate) struct Rewriter {
 impl Rewriter {
     /// Begins one.
     pub(crate) fn create(to: &Path) -> Result<Self, RewriteError> {
-        if to.symlink_metadata().is_ok() {
-            return Err(RewriteError::Exists(Shown(to.to_owned())));
-        }
-        let mut part = to.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        // What an interrupted one left.
-        let _ = std::fs::remove_file(&part);
-        let file = OpenFile::create(&mut RealDisk, &part)?;
-        Ok(Self { file: Some(file), part, to: to.to_owned(), channels: BTreeMap::new(), chunk_bytes: 0, messages: 0 })
+        let (part, made) = PartFile::create(to, |path| RealDisk.create(path))?;
+        let file = OpenFile::begin(&mut RealDisk, part.path(), made)?;
+        Ok(Self { file: Some(file), part: Some(part), channels: BTreeMap::new(), chunk_bytes: 0, messages: 0 })
     }
 
     /// Messages so far, without those that are repeated from an earlier file.
@@ -108,9 +90,7 @@ impl Rewriter {
     pub(crate) fn finish(mut self) -> Result<u64, RewriteError> {
         let Some(file) = &mut self.file else { return Ok(0) };
         let bytes = file.close(&mut RealDisk)?;
-        let renamed = std::fs::rename(&self.part, &self.to);
-        let failed = |error| DiskError::new("give the file its name", &self.to, error);
-        renamed.map_err(failed)?;
+        self.part.take().map_or(Ok(()), PartFile::finish)?;
         self.file = None;
         Ok(bytes)
     }
@@ -120,7 +100,6 @@ impl Drop for Rewriter {
     fn drop(&mut self) {
         if let Some(file) = self.file.take() {
             file.abandon();
-            let _ = std::fs::remove_file(&self.part);
         }
     }
 }

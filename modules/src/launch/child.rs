@@ -178,11 +178,6 @@ impl Child {
         self.process.as_ref().map(ModuleProcess::started)
     }
 
-    /// Why it is in error now, if it is.
-    pub(super) fn present_error(&self) -> Option<&str> {
-        self.health.present_error()
-    }
-
     /// Whether its node does not start without it.
     pub(super) fn is_required(&self) -> bool {
         self.required

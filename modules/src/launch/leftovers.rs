@@ -5,7 +5,6 @@ use super::error::NotStarted;
 use crate::runtime::environment;
 use rohrpost_config::{Installation, Module};
 use rohrpost_mailbox::{Node, NodeError, ParticipantInfo, ParticipantProcess, ProcessError};
-use std::fs;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -124,11 +123,6 @@ pub(super) fn note_config(
 ) -> Result<(), NodeError> {
     let path = installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone());
     let config = format!("{}\n{node_name}\n", path.display());
-    for (name, bytes) in [(CONFIG_FILE, config.as_bytes()), (RESOLVED_FILE, resolved)] {
-        let file = node.path().join(name);
-        let unfinished = file.with_extension("new");
-        let written = fs::write(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, &file));
-        written.map_err(|error| NodeError::Io(file, error))?;
-    }
-    Ok(())
+    node.put_file(CONFIG_FILE, config.as_bytes())?;
+    node.put_file(RESOLVED_FILE, resolved)
 }

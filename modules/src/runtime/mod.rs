@@ -41,7 +41,7 @@ pub use host::{ClientError, ToolLink, describe};
 pub use received::Received;
 pub use run::{exit, run, run_described, run_started, tell_exit};
 pub use server::{read_arguments, write_result};
-pub use start::{Start, find_other_versions, find_running, kept};
+pub use start::{Start, find_running, find_unusable, kept};
 pub(crate) use start::{environment, stop_signals};
 pub use stream::{
     Moment, OpenValue, Record, RecordError, StayingBytes, Stream, StreamReadError, StreamSubscription, SuspendedValue,

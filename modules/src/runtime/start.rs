@@ -375,19 +375,20 @@ pub fn find_running() -> Vec<PathBuf> {
         .collect()
 }
 
-/// Why nodes of this user cannot be looked into that another version of Rohrpost made: [`NodeError::Version`] of each.
+/// Why nodes cannot be looked into that are where this user's are: [`NodeError::Version`] of each that another version
+/// of Rohrpost made, and [`NodeError::Foreign`] of each that another user made.
 ///
 /// ```
-/// for error in rohrpost_modules::runtime::find_other_versions() {
+/// for error in rohrpost_modules::runtime::find_unusable() {
 ///     eprintln!("{error}");
 /// }
 /// ```
-pub fn find_other_versions() -> Vec<NodeError> {
+pub fn find_unusable() -> Vec<NodeError> {
     let errors = nodes().into_iter().filter_map(|(_, node)| node.err());
-    errors.filter(|error| matches!(error, NodeError::Version(..))).collect()
+    errors.filter(|error| matches!(error, NodeError::Version(..) | NodeError::Foreign(..))).collect()
 }
 
-/// All nodes of this user, by their directories.
+/// All that is where nodes of this user are, by their directories.
 fn nodes() -> Vec<(PathBuf, Result<Arc<Node>, NodeError>)> {
     let entries = std::fs::read_dir(base_directory()).into_iter().flatten();
     let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();

@@ -6,7 +6,7 @@
 //!  base.system-1.rohrpost       node `base` of system 1: it may host names of that system, and of no other
 //! ```
 
-use rohrpost_config::{KeysError, check_secret};
+use rohrpost_config::{KeysError, open_secret};
 use rustls::client::{Resumption, WebPkiServerVerifier};
 use rustls::crypto::ring;
 use rustls::pki_types::pem::PemObject;
@@ -15,7 +15,6 @@ use rustls::server::{NoServerSessionStorage, WebPkiClientVerifier};
 use rustls::{
     AlertDescription, CertificateError, ClientConfig, Connection, Error, RootCertStore, ServerConfig, version,
 };
-use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -173,8 +172,7 @@ impl Files {
         let mut roots = RootCertStore::empty();
         let trusted = roots.add(certificate(&authority)?);
         trusted.map_err(|error| SealError::File(authority.clone(), error.to_string()))?;
-        let file = File::open(&key).map_err(|error| SealError::File(key.clone(), error.to_string()))?;
-        check_secret(&key, &file)?;
+        let file = open_secret(&key, |error| SealError::File(key.clone(), error.to_string()))?;
         let secret =
             PrivateKeyDer::from_pem_reader(file).map_err(|error| SealError::File(key.clone(), error.to_string()))?;
         Ok(Self { folder: folder.into(), roots: Arc::new(roots), chain: vec![certificate(&own)?], key: secret })

@@ -1,6 +1,7 @@
 //! Writes files that belong together: all are completely on the disk before the first gets its name.
 
 use super::error::CertificateError;
+use rohrpost_config::KeysError;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -26,12 +27,16 @@ impl Written {
         beside.into()
     }
 
-    fn write(&self) -> io::Result<()> {
-        // A temporary file from a crash belongs to no process.
-        let _ = fs::remove_file(self.beside());
-        let mut file = OpenOptions::new().write(true).create_new(true).mode(self.mode).open(self.beside())?;
-        file.write_all(self.text.as_bytes())?;
-        file.sync_all()
+    /// Writes it under its temporary name. Nothing that has this name is touched: it may be a user's.
+    fn write(&self) -> Result<(), CertificateError> {
+        let (beside, failed) = (self.beside(), |error| CertificateError::File(self.path.clone(), error));
+        let opened = OpenOptions::new().write(true).create_new(true).mode(self.mode).open(&beside);
+        let mut file = opened.map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => KeysError::Left(beside.clone()).into(),
+            _ => failed(error),
+        })?;
+        let written = file.write_all(self.text.as_bytes()).and_then(|()| file.sync_all());
+        written.inspect_err(|_| _ = fs::remove_file(&beside)).map_err(failed)
     }
 }
 
@@ -50,10 +55,15 @@ pub(super) fn put(
         move |error| CertificateError::File(path, error)
     };
     fs::create_dir_all(folder).map_err(failed(folder))?;
-    let written = files.iter().try_for_each(|file| file.write().map_err(failed(&file.path)));
+    let mut made = Vec::new();
+    let written = files.iter().try_for_each(|file| {
+        file.write()?;
+        made.push(file.beside());
+        Ok(())
+    });
     written.and_then(|()| before()).inspect_err(|_| {
-        for file in files {
-            let _ = fs::remove_file(file.beside());
+        for beside in made {
+            let _ = fs::remove_file(beside);
         }
     })?;
     for file in files {

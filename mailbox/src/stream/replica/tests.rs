@@ -296,7 +296,7 @@ fn what_does_not_fit_is_not_written() {
 fn what_has_no_time_does_not_wait_for_a_process_that_has_the_registry() {
     let (_folder, participant, id) = ground();
     let first = |patience| participant.replica_writer_within(id, SHAPE, 3, patience).map(|replica| replica.next());
-    let registry = RegistryLock::take(participant.node().path()).unwrap();
+    let registry = RegistryLock::take(participant.node().directory()).unwrap();
     let busy = first(Duration::ZERO);
     assert!(matches!(busy, Err(StreamError::Node(NodeError::Busy(_)))), "{busy:?}");
     let removed = participant.node().remove_orphan_stream_within(id, Duration::ZERO);

@@ -21,11 +21,11 @@ mod schema;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{DiskError, ReadError};
+use crate::error::{DiskError, ReadError, RewriteError};
 use crate::format::{key, metadata};
 use crate::read::contents::Found;
 use crate::read::selected::Selected;
-use crate::rewrite::{Progress, RewriteError, Rewriter};
+use crate::rewrite::{Progress, Rewriter};
 use crate::selection::{SelectError, Selection, listed};
 pub(crate) use beside::DrawingBeside;
 pub use beside::DrawnBeside;

@@ -1,5 +1,6 @@
 //! A file record by record, as far as it goes.
 
+use crate::disk::open_to_read;
 use crate::error::{Damage, ReadError, Shown};
 use crate::format::{RECORD_BYTES_MAX, op};
 use std::fs::File;
@@ -35,7 +36,7 @@ impl Frames {
     /// At the first record.
     pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
         let failed = |error| ReadError::Io { path: Shown(path.to_owned()), error };
-        let file = File::open(path).map_err(failed)?;
+        let file = open_to_read(path).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
         let mut frames = Self {
             path: path.to_owned(),

@@ -3,7 +3,7 @@
 use super::support::{Said, file_of, memory_folder, options, read, said, session};
 use crate::{
     ChannelSpec, CutError, LastMessage, Mark, Message, ReadError, RecoverError, RewriteError, SelectError, Selection,
-    Writer, cut, info, last_message, recover, recovered_path,
+    Writer, cut, info, last_message, merge, recover, recovered_path,
 };
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
@@ -121,6 +121,10 @@ fn what_is_no_recording_is_told_and_nothing_is_made() {
     assert!(!to.exists());
     let error = recover(&folder.path().join("none.mcap"), &to, &mut |_, _| {}).unwrap_err();
     assert!(matches!(error, RecoverError::Read(ReadError::Io { .. })), "{error}");
+    let pipe = folder.path().join("pipe.mcap");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    let error = recover(&pipe, &to, &mut |_, _| {}).unwrap_err().to_string();
+    assert!(error.contains("it is no regular file"), "a pipe is not waited for: {error}");
 }
 
 #[test]
@@ -132,6 +136,28 @@ fn what_is_recovered_overwrites_nothing() {
     recover(&path, &to, &mut |_, _| {}).unwrap();
     let error = recover(&path, &to, &mut |_, _| {}).unwrap_err();
     assert_eq!(error.existing().map(|shown| shown.0.clone()), Some(to));
+}
+
+#[test]
+fn no_file_of_a_user_is_taken_for_a_temporary_one() {
+    let folder = memory_folder();
+    let path = file_of(folder.path(), "base", &said(3, 10));
+    let to = folder.path().join("new.mcap");
+    let parts = ["new.mcap.part", "new.mcap.2.part"].map(|name| folder.path().join(name));
+    let files = || std::fs::read_dir(folder.path()).unwrap().count();
+    std::fs::write(&parts[0], "a user's").unwrap();
+    std::os::unix::fs::symlink(&parts[0], &parts[1]).unwrap();
+    let before = files();
+    for what in ["recover", "cut", "merge"] {
+        match what {
+            "recover" => drop(recover(&path, &to, &mut |_, _| {}).unwrap()),
+            "cut" => drop(cut(&path, &to, &Selection::default(), &mut |_, _| {}).unwrap()),
+            _ => drop(merge(std::slice::from_ref(&path), &to, &mut |_, _| {}).unwrap()),
+        }
+        assert_eq!(std::fs::read_to_string(&parts[1]).unwrap(), "a user's", "{what}");
+        assert_eq!(files(), before + 1, "{what} leaves the new file alone");
+        std::fs::remove_file(&to).unwrap();
+    }
 }
 
 #[test]

@@ -26,10 +26,21 @@ impl Child {
         (word.state == Some(ModuleState::Error)).then_some(word.errors)
     }
 
+    /// The number of the error that it is in, or of what it complains of.
+    pub(in crate::launch) fn in_trouble(&self, node: &Node) -> Option<u32> {
+        let word = self.last_word(node)?;
+        (word.state == Some(ModuleState::Error) || word.complains).then_some(word.errors)
+    }
+
     /// The same, if why is not known yet.
     pub(in crate::launch) fn asks_why(&mut self, node: &Node) -> Option<u32> {
-        let in_error = self.in_error(node);
-        self.health.asks_why(in_error)
+        let in_trouble = self.in_trouble(node);
+        self.health.asks_why(in_trouble)
+    }
+
+    /// Why it is in error now, if it is.
+    pub(in crate::launch) fn present_error(&self, node: &Node) -> Option<&str> {
+        self.health.present_error().filter(|_| self.in_error(node).is_some())
     }
 
     /// Looks whether a part of its own code has not come back for long.

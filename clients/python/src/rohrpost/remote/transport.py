@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +23,7 @@ class Tls:
     own: str
 
     def context(self) -> ssl.SSLContext:
-        """Raises :class:`NoConnection`, if a file is missing or is none of these."""
+        """Raises :class:`NoConnection`, if a file is missing, is none of these, or others may read the key."""
         folder = Path(self.folder)
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.minimum_version = ssl.TLSVersion.TLSv1_3
@@ -30,12 +31,25 @@ class Tls:
         for file in files:
             if not file.is_file():
                 raise NoConnection(f"there is no {file}; `rohrpost keys new` makes it, bring it here")
+        _check_secret(files[2])
         try:
             context.load_verify_locations(files[0])
             context.load_cert_chain(files[1], files[2])
         except (ssl.SSLError, OSError) as error:
             raise NoConnection(f"the certificates in {folder} cannot be read: {error}") from None
         return context
+
+
+def _check_secret(path: Path) -> None:
+    """Refuses a key that others than its owner may read: the rule and the words of the programs in Rust
+    (``open_secret``)."""
+    mode = path.stat().st_mode & 0o7777
+    # Windows has no such modes.
+    if mode & 0o077 and os.name == "posix":
+        raise NoConnection(
+            f"{path}: others than its owner may read these keys (mode {mode:o}); run `chmod 600 {path}`, and if "
+            "others could log in here, change the keys"
+        )
 
 
 class Plain:

@@ -221,8 +221,8 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "the_directory_stays",
         edits: &[edit(
             "registry",
-            "fs::remove_dir_all(self.path()).map_err(failed)?;",
-            "if !broken!(the_directory_stays) { fs::remove_dir_all(self.path()).map_err(failed)?; }",
+            "self.directory().remove_all().map_err(failed)?;",
+            "if !broken!(the_directory_stays) { self.directory().remove_all().map_err(failed)?; }",
         )],
         scene: SENDING,
         says: "check Gone",
