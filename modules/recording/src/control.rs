@@ -6,9 +6,9 @@
 //!             └──────────────────────────────────────────────▶ ControlAnswer
 //! ```
 //!
-//! Opens no socket. Any bytes may come: what is kept of them is less than [`CONTROL_LINE_BYTES_MAX`]. Behind a line that
-//! is no command nothing is read: a program that speaks another protocol, such as HTTP, TLS or SMTP, may have been made
-//! to send any lines in it. A web page has a browser do that.
+//! Opens no socket. Any bytes may come: what is kept of them is less than [`CONTROL_LINE_BYTES_MAX`]. Behind a line
+//! that is no command nothing is read: a program that speaks another protocol, such as HTTP, TLS or SMTP, may have been
+//! made to send any lines in it. A web page has a browser do that.
 
 use std::fmt::{self, Write};
 use std::str::FromStr;

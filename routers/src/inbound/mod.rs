@@ -126,8 +126,8 @@ impl Inbound {
         }
     }
 
-    /// Reads a datagram that is for this port; its sequence counts from 0 then. What is for another port says nothing of
-    /// its sender here: at each port it counts anew, and says something else.
+    /// Reads a datagram that is for this port; its sequence counts from 0 then. What is for another port says nothing
+    /// of its sender here: at each port it counts anew, and says something else.
     fn parse<'a>(&self, bytes: &'a [u8]) -> Result<(FrameHead, Frame<'a>), BadFrame> {
         let (head, frame) = Frame::parse(bytes)?;
         let port = self.stats.port;

@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_connection_that_takes_no_answer_ends_and_one_whose_order_is_under_way_does_not() {
+    fn a_connection_that_takes_no_answer_ends_and_one_with_an_order_under_way_does_not() {
         let began = Instant::now();
         let (mut client, _other) = connected(began);
         let answer = ControlAnswer::ok().with_text("text", &"x".repeat(100_000));

@@ -48,8 +48,8 @@ impl World {
         }
     }
 
-    /// Somebody at an address of its own says hello as the present incarnation of a client, and goes again. Nobody loses
-    /// its place by that.
+    /// Somebody at an address of its own says hello as the present incarnation of a client, and goes again. Nobody
+    /// loses its place by that.
     pub(super) fn impersonate(&mut self) {
         let is_there = self.may_fail && self.now_ns >= self.server_down_until_ns;
         if !is_there || !self.impostors.per_million(500) {
