@@ -95,7 +95,7 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::BelievesIncarnations, Promise::Recovery, Network::Forged, 0),
     caught(Mistake::BelievesJumps, Promise::Recovery, Network::Forged, 0),
     caught(Mistake::BelievesRefusals, Promise::Recovery, Network::Forged, 0),
-    caught(Mistake::TakesOtherPorts, Promise::Recovery, Network::Strayed, 0),
+    caught(Mistake::TakesOtherPorts, Promise::Recovery, Network::Strayed, 1),
     caught(Mistake::AdmitsHurry, Promise::Admission, Network::Intruded, 0),
     caught(Mistake::AdmitsForeignNames, Promise::Admission, Network::Intruded, 0),
     caught(Mistake::AdmitsRoutersOwn, Promise::Admission, Network::Intruded, 0),
