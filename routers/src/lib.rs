@@ -45,6 +45,7 @@ pub mod latencies;
 pub mod link;
 mod netlink;
 pub mod outbound;
+mod port;
 pub mod queue;
 pub mod replication;
 pub mod report;

@@ -1,12 +1,13 @@
 //! What a router counts: packages by class, losses by cause, peers.
 //!
-//! What is not real time has threads of its own ([`Stats::of_rest`]): they count its classes in the same places, and
+//! Other ports have threads of their own ([`Stats::of_port`]): they count classes of packages in the same places, and
 //! datagrams in their own.
 
 use crate::counts::{Count, PeerReceived, PeerSent, Side};
 use crate::flows::Flows;
 use crate::frame::NodeIndex;
 use crate::link::Link;
+use crate::port::Port;
 use crate::settings::Settings;
 use rohrpost_network::LEVELS;
 use std::sync::Arc;
@@ -44,7 +45,9 @@ pub struct Stats {
     pub on_wire_bytes: Count,
     /// When the router began, ns of the monotonic clock.
     pub started_ns: u64,
-    /// Of what is not real time: the counters that know which peers are there.
+    /// The port of these datagrams.
+    pub(crate) port: Port,
+    /// At another port than that of packages: the counters that know which peers are there.
     knows: Option<Arc<Self>>,
 }
 
@@ -69,12 +72,13 @@ impl Stats {
             flows: Arc::new(Flows::new(&settings.flows)),
             on_wire_bytes: Count::default(),
             started_ns: now_ns,
+            port: Port::Packages,
             knows: None,
         })
     }
 
-    /// Counters of the same router, for the threads that carry what is not real time.
-    pub fn of_rest(settings: &Settings, all: &Arc<Self>) -> Arc<Self> {
+    /// Counters of the same router, for the threads of another port: of what is not real time, or of replicas.
+    pub fn of_port(port: Port, settings: &Settings, all: &Arc<Self>) -> Arc<Self> {
         let Self { out, inn, flows, started_ns, .. } = &**all;
         Arc::new(Self {
             out: out.clone(),
@@ -87,6 +91,7 @@ impl Stats {
             flows: flows.clone(),
             on_wire_bytes: Count::default(),
             started_ns: *started_ns,
+            port,
             knows: Some(all.clone()),
         })
     }

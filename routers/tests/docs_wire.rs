@@ -7,6 +7,7 @@ use rohrpost_routers::frame::{
     Alive, DescriptionPart, Fragment, Frame, FrameHead, FrameKind, RecordPart, Refusal, RefusalReason, ReplicaFrame,
     VERSION,
 };
+use rohrpost_routers::security::Port;
 use rohrpost_routers::session::frame::{HOPS_MAX, SessionFrameHead, SessionMessage};
 use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, HANDSHAKE_MAX_NS};
 use rohrpost_routers::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
@@ -115,7 +116,8 @@ fn parts_of_sessions_have_the_documented_bytes() {
 fn a_record_part_has_the_documented_bytes() {
     let part = PART;
     let rest = [&part.head_bytes()[..], part.bytes].concat();
-    let head = FrameHead { kind: FrameKind::RecordPart, sequence: 12, ..HEAD };
+    let sequence = Port::Replicas.first_sequence() + 12;
+    let head = FrameHead { kind: FrameKind::RecordPart, sequence, ..HEAD };
     check("record-part", head, &rest, |frame| assert_eq!(frame, Frame::Replica(ReplicaFrame::Record(part))));
 }
 

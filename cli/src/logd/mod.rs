@@ -201,7 +201,7 @@ impl Logd {
                 }
             }
         }
-        self.control.watch(context);
+        self.control.watch(context, now);
     }
 }
 

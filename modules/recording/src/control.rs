@@ -2,11 +2,13 @@
 //!
 //! ```text
 //! bytes ──▶ ControlLines ──▶ ControlCommand ──▶ (recorder) ──▶ ControlAnswer ──▶ `OK key=value …` or `ERR why`
-//!             │ a line that is too long, or no command
+//!             │ a line that is too long, or no command: the last one
 //!             └──────────────────────────────────────────────▶ ControlAnswer
 //! ```
 //!
-//! Opens no socket. Any bytes may come: what is kept of them is less than [`CONTROL_LINE_BYTES_MAX`].
+//! Opens no socket. Any bytes may come: what is kept of them is less than [`CONTROL_LINE_BYTES_MAX`]. Behind a line
+//! that is no command nothing is read: a program that speaks another protocol, such as HTTP, TLS or SMTP, may have been
+//! made to send any lines in it. A web page has a browser do that.
 
 use std::fmt::{self, Write};
 use std::str::FromStr;
@@ -14,9 +16,6 @@ use thiserror::Error;
 
 /// Bytes of a line, with its end.
 pub const CONTROL_LINE_BYTES_MAX: usize = 1024;
-/// A line that begins with one of them is a request of HTTP, as any web page can have a browser send it.
-const HTTP_METHODS: [&[u8]; 9] =
-    [b"GET", b"POST", b"PUT", b"HEAD", b"OPTIONS", b"PATCH", b"DELETE", b"CONNECT", b"TRACE"];
 /// So much of a wrong word is repeated in the answer.
 const WORD_CHARS_MAX: usize = 20;
 
@@ -43,12 +42,12 @@ pub enum ControlError {
     /// It has no end within bounds.
     #[error("the line is too long; a command has at most {} bytes", CONTROL_LINE_BYTES_MAX - 1)]
     TooLong,
-    /// It is no text, or has control characters.
-    #[error("the line is no text; write one command in letters, and end it with a line feed")]
-    NoText,
-    /// It belongs to a request of HTTP. Nothing behind it is to be obeyed: it may be from a web page.
-    #[error("this is HTTP, and nothing of it is obeyed; open a connection of its own, and send commands alone")]
-    Http,
+    /// It is not in UTF-8.
+    #[error("the line is not in UTF-8; write one command in UTF-8, and end it with a line feed")]
+    NotUtf8,
+    /// It has control characters.
+    #[error("the line has control characters; write one command without any, and end it with a line feed")]
+    ControlCharacters,
     /// A word that is no command.
     #[error("no command `{0}`; there are on, off, directory PATH, status, mark TEXT, rotate")]
     Unknown(String),
@@ -80,7 +79,7 @@ impl FromStr for ControlCommand {
     /// Reads a line without its end.
     fn from_str(line: &str) -> Result<Self, ControlError> {
         if line.contains(char::is_control) {
-            return Err(ControlError::NoText);
+            return Err(ControlError::ControlCharacters);
         }
         let line = line.trim();
         let (word, rest) = line.split_once(' ').map_or((line, ""), |(word, rest)| (word, rest.trim_start()));
@@ -105,8 +104,8 @@ impl FromStr for ControlCommand {
 pub struct ControlLines {
     /// Of the line that has no end yet, and of those behind the one that was taken last.
     bytes: Vec<u8>,
-    /// The rest of a line that was too long comes, and is passed over.
-    skips: bool,
+    /// A line was no command: what comes behind it is passed over.
+    is_over: bool,
 }
 
 impl ControlLines {
@@ -118,47 +117,38 @@ impl ControlLines {
     /// Takes bytes, as many as there is room for; how many.
     pub fn put(&mut self, bytes: &[u8]) -> usize {
         let taken = bytes.len().min(self.room());
-        self.bytes.extend_from_slice(&bytes[..taken]);
+        if !self.is_over {
+            self.bytes.extend_from_slice(&bytes[..taken]);
+        }
         taken
     }
 
-    /// The next command, or what is wrong with its line. None: more bytes are to come. Empty lines are passed over.
+    /// The next command, or what is wrong with its line; nothing comes behind that. None: more bytes are to come. Empty
+    /// lines are passed over.
     pub fn next_command(&mut self) -> Option<Result<ControlCommand, ControlError>> {
+        let line = self.next_line()?;
+        if line.is_err() {
+            self.is_over = true;
+            self.bytes.clear();
+        }
+        Some(line)
+    }
+
+    fn next_line(&mut self) -> Option<Result<ControlCommand, ControlError>> {
         loop {
             let Some(end) = self.bytes.iter().position(|byte| *byte == b'\n') else {
-                if self.skips {
-                    self.bytes.clear();
-                } else if self.room() == 0 {
-                    let error = if is_http(&self.bytes) { ControlError::Http } else { ControlError::TooLong };
-                    self.bytes.clear();
-                    self.skips = true;
-                    return Some(Err(error));
-                }
-                return None;
+                return (self.room() == 0).then_some(Err(ControlError::TooLong));
             };
             let line: Vec<u8> = self.bytes.drain(..=end).collect();
-            if std::mem::take(&mut self.skips) {
-                continue;
-            }
             // As telnet ends a line.
             let line = &line[..end];
             let line = line.strip_suffix(b"\r").unwrap_or(line);
-            if is_http(line) {
-                return Some(Err(ControlError::Http));
-            }
             if !line.is_empty() {
-                let text = std::str::from_utf8(line).map_err(|_| ControlError::NoText);
+                let text = std::str::from_utf8(line).map_err(|_| ControlError::NotUtf8);
                 return Some(text.and_then(str::parse));
             }
         }
     }
-}
-
-/// Whether a line, or what came of it, is of a request.
-fn is_http(line: &[u8]) -> bool {
-    let line = line.trim_ascii_start();
-    let word = line.split(|byte| *byte == b' ').next().unwrap_or_default();
-    HTTP_METHODS.contains(&word) || line.get(..5).is_some_and(|name| name.eq_ignore_ascii_case(b"Host:"))
 }
 
 /// The answer to one command: one line of ASCII.
@@ -233,32 +223,54 @@ mod tests {
             ("rotate", ControlCommand::Rotate),
             ("directory  run 7", ControlCommand::Directory("run 7".into())),
             ("mark door open: 3\u{b0}", ControlCommand::Mark("door open: 3\u{b0}".into())),
+            ("mark T\u{fc}r", ControlCommand::Mark("T\u{fc}r".into())),
+            ("mark Tu\u{308}r \u{6f22}\u{1f6aa}", ControlCommand::Mark("Tu\u{308}r \u{6f22}\u{1f6aa}".into())),
             ("mark off", ControlCommand::Mark("off".into())),
         ] {
-            assert_eq!(read(format!("{line}\n").as_bytes()), [Ok(command)], "{line}");
+            let line = format!("{line}\n");
+            assert_eq!(read(line.as_bytes()), [Ok(command.clone())], "{line}");
+            assert_eq!(read_in_parts(line.as_bytes(), &[1]), [Ok(command)], "{line}, byte by byte");
         }
         for (line, words) in [
             (&b"ON"[..], "no command `ON`; there are on, "),
             (b"mark", "`mark` needs a text; write `mark TEXT`"),
             (b"directory ", "`directory` needs a folder; write `directory PATH`"),
             (b"rotate now", "`rotate` stands alone"),
-            (b"mark a\x07b", "no text"),
-            (b"\xff\xfb\x01", "no text"),
+            (b"mark a\x07b", "has control characters"),
+            (b"mark T\xfcr", "not in UTF-8"),
+            (b"\xff\xfb\x01", "not in UTF-8"),
             (&b"a".repeat(500), "no command `aaaaaaaaaaaaaaaaaaaa`;"),
             (&b"a".repeat(1500), "too long"),
-            (b"POST /off HTTP/1.1\r", "this is HTTP"),
-            (b"GET /\xff", "this is HTTP"),
-            (b"host: 127.0.0.1:21121\r", "this is HTTP"),
-            (&[&b"POST /"[..], &b"a".repeat(1500)].concat(), "this is HTTP"),
-            (b"POSTS", "no command `POSTS`"),
         ] {
-            let told = read(&[line, b"\nstatus\n"].concat());
-            assert_eq!((told.len(), &told[1]), (2, &Ok(ControlCommand::Status)), "{told:?}");
-            let error = told[0].clone().unwrap_err().to_string();
+            let told = read(&[b"status\n", line, b"\n"].concat());
+            assert_eq!((told.len(), &told[0]), (2, &Ok(ControlCommand::Status)), "{told:?}");
+            let error = told[1].clone().unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         }
         assert_eq!(read(b"\n\r\n\n"), []);
         assert_eq!(read(b"status"), [], "its end may still come, and say more");
+    }
+
+    /// What a program sends that speaks another protocol, and that somebody has made to send commands, too.
+    #[test]
+    fn behind_a_line_that_is_no_command_nothing_is_obeyed() {
+        let hello = b"\x16\x03\x01\x00\xf4\x01\x00\x00\xf0\x03\x03";
+        for (said, protocol) in [
+            (&b"POST / HTTP/1.1\r\nHost: 127.0.0.1:21121\r\n\r\n"[..], "HTTP"),
+            (b"hOST: 127.0.0.1\r\n", "a line of its head"),
+            (&[&b"POST /"[..], &b"a".repeat(1500), b"\r\n"].concat(), "a long one"),
+            (&[&hello[..], b"\n"].concat(), "TLS"),
+            (&[&hello[..], &[7; 1500], b"\n"].concat(), "a long hello"),
+            (b"EHLO robot\r\n", "SMTP"),
+            (b"*1\r\n$3\r\n", "redis"),
+            (b"SSH-2.0-OpenSSH_9.6\r\n", "SSH"),
+            (b"USER anonymous\r\n", "FTP"),
+            (b"{\"jsonrpc\":\"2.0\"}\n", "JSON"),
+            (b"\n\n\0\n", "what begins with empty lines"),
+        ] {
+            let told = read(&[said, b"off\noff\r\n"].concat());
+            assert!(matches!(told[..], [Err(_)]), "{protocol}: {told:?}");
+        }
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod part_request;
 mod refusal;
 mod replica;
 
+use crate::port::{Port, SEQUENCES};
 use fields::long;
 pub use fields::{BadFrame, VERSION};
 pub use part_request::{ASKED_PARTS_MAX, PART_REQUEST_BYTES_MAX, PartRequest, PartRequestBytes};
@@ -33,7 +34,7 @@ pub use rohrpost_network::{
 pub const PARTS_MAX: u16 = 256;
 const MAGIC: [u8; 2] = *b"Rp";
 /// A million datagrams a second reach it after nine years; so a sequence and a place in its datagram fit in 64 bits.
-pub const SEQUENCE_MAX: u64 = (1 << 48) - 1;
+pub const SEQUENCE_MAX: u64 = SEQUENCES - 1;
 const CHECK: std::ops::Range<usize> = 32..36;
 
 /// A node by its place in the configuration, from 0.
@@ -101,8 +102,8 @@ pub struct FrameHead {
     pub digest: u64,
     /// Distinguishes this incarnation of the sending router from its others; never 0.
     pub incarnation: u64,
-    /// Counts the datagrams of this incarnation from this sender to this receiver, from 0. Time frames have a count of
-    /// their own.
+    /// Counts the datagrams of this incarnation from this sender to this port of the receiver, up to [`SEQUENCE_MAX`];
+    /// where nothing is sealed from [`Port::first_sequence`] on.
     pub sequence: u64,
 }
 
@@ -162,10 +163,12 @@ impl FrameHead {
         if head.incarnation == 0 {
             return Err(BadFrame::Damaged("incarnation 0"));
         }
-        if head.sequence > SEQUENCE_MAX {
+        let key = b[7];
+        let is_of_a_port = |port: &Port| port.has_sequence(head.sequence);
+        if head.sequence > SEQUENCE_MAX && (key != 0 || !Port::ALL.iter().any(is_of_a_port)) {
             return Err(BadFrame::Damaged("a sequence that no router reaches"));
         }
-        Ok((head, b[7]))
+        Ok((head, key))
     }
 }
 

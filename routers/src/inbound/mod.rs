@@ -17,6 +17,7 @@ pub use window::{REORDER_MAX, WINDOW};
 use crate::admission::capped;
 use crate::counts::Cause;
 use crate::frame::{BadFrame, Fragment, Frame, FrameHead, NodeIndex, RefusalReason, VERSION};
+use crate::port::SEQUENCES;
 use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
 use crate::stats::Stats;
@@ -106,7 +107,7 @@ impl Inbound {
     pub fn handle(&mut self, now_ns: u64, datagram: &Datagram<'_>, deliver: &mut impl Deliver) {
         let Datagram { source, arrived_ns, bytes } = *datagram;
         let came = Envelope { source, arrived_ns, bytes: bytes.len() };
-        match Frame::parse(datagram.bytes) {
+        match self.parse(datagram.bytes) {
             Ok((_, Frame::Refusal(refusal))) => self.refused_by(now_ns, source, &refusal, deliver),
             Ok((_, Frame::Time(_))) | Err(BadFrame::Foreign) => self.stats.foreign.add(1),
             Ok((head, frame)) => match self.mismatch(source, &head) {
@@ -123,6 +124,17 @@ impl Inbound {
             }
             Err(BadFrame::Damaged(_)) => self.damaged(source),
         }
+    }
+
+    /// Reads a datagram that is for this port; its sequence counts from 0 then. What is for another port says nothing
+    /// of its sender here: at each port it counts anew, and says something else.
+    fn parse<'a>(&self, bytes: &'a [u8]) -> Result<(FrameHead, Frame<'a>), BadFrame> {
+        let (head, frame) = Frame::parse(bytes)?;
+        let port = self.stats.port;
+        if !port.has_sequence(head.sequence) {
+            return Err(BadFrame::Foreign);
+        }
+        Ok((FrameHead { sequence: head.sequence % SEQUENCES, ..head }, frame))
     }
 
     /// Handles a datagram that was sealed, and opened: `text` is what follows its head, `first` the first sequence that

@@ -27,6 +27,8 @@ pub(super) struct PeerReceiver {
     began_ns: u64,
     /// More than one of its datagrams came.
     is_sure: bool,
+    /// The last time that its sequences went on far ahead.
+    leap: Option<Leap>,
     doubt: Confirmation,
     /// Bounds the reports that an incarnation began.
     restarts_told: Throttle,
@@ -37,6 +39,14 @@ pub(super) struct PeerReceiver {
     pub(super) reassembly: Reassembly,
     pub(super) refusing: Refusing,
     told: PeerNotices,
+}
+
+/// Sequences that were passed over, since two datagrams were far ahead. They may have been forged.
+#[derive(Clone, Copy, Debug)]
+struct Leap {
+    /// The sequence that was expected before.
+    from: u64,
+    at_ns: u64,
 }
 
 /// Refusals to one address.
@@ -85,11 +95,11 @@ impl PeerReceiver {
         way: &PeerContext<'_>,
         deliver: &mut impl Deliver,
     ) -> bool {
+        let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
         if head.incarnation == self.incarnation {
-            return first.is_some() || self.is_plausible(now_ns, head);
+            return first.is_some() || self.is_plausible(now_ns, head, is_silent);
         }
         let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
-        let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
         let goes_on = was.is_some_and(|place| head.sequence >= self.old[place].next);
         let may_go_on = first.is_some() || (is_silent && goes_on);
         if was.is_some() && !may_go_on {
@@ -125,6 +135,7 @@ impl PeerReceiver {
             (None, None) => SequenceWindow::default(),
         };
         (self.incarnation, self.began_ns, self.is_sure) = (head.incarnation, now_ns, !is_first);
+        self.leap = None;
         way.peer.link.incarnation.set(head.incarnation);
         way.peer.link.begin(now_ns);
         way.peer.link.accept();
@@ -132,11 +143,13 @@ impl PeerReceiver {
     }
 
     /// Whether the sequence of a datagram is plausible. A peer that did not reach us for long is far ahead, too. One is
-    /// far behind if the only datagram of it so far was forged.
-    fn is_plausible(&mut self, now_ns: u64, head: &FrameHead) -> bool {
+    /// far behind if the only datagram of it so far was forged; or if those were that were far ahead: then nothing
+    /// follows them for a second, and the peer goes on from before.
+    fn is_plausible(&mut self, now_ns: u64, head: &FrameHead, is_silent: bool) -> bool {
         let next = self.window.next();
         let is_ahead = head.sequence >= next + WINDOW;
-        let is_behind = head.sequence + WINDOW < next && !self.is_sure;
+        let goes_on = is_silent && self.leap.is_some_and(|leap| head.sequence >= leap.from);
+        let is_behind = head.sequence + WINDOW < next && (!self.is_sure || goes_on);
         if !is_ahead && !is_behind {
             self.is_sure |= head.sequence + 1 != next;
             return true;
@@ -145,11 +158,19 @@ impl PeerReceiver {
             return false;
         }
         if is_behind {
-            self.window = SequenceWindow::joining(head.sequence);
+            let restart = if goes_on { SequenceWindow::going_on } else { SequenceWindow::joining };
+            self.window = restart(head.sequence);
             self.order.clear();
         }
+        self.leap = is_ahead.then(|| self.leap_from(now_ns, next));
         self.is_sure = true;
         true
+    }
+
+    /// A leap from this sequence on. One shortly after another is a part of it.
+    fn leap_from(&self, now_ns: u64, next: u64) -> Leap {
+        let before = self.leap.filter(|leap| now_ns.saturating_sub(leap.at_ns) < OLD_GONE_NS);
+        Leap { from: before.map_or(next, |leap| leap.from), at_ns: now_ns }
     }
 
     fn end_incarnation(&mut self, way: &PeerContext<'_>, deliver: &mut impl Deliver) {

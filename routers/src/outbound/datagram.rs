@@ -131,7 +131,8 @@ impl Outbound {
         let sequence = self.stats.peer(to).sent.datagrams.get();
         let head = FrameHead { kind, system, from: own, to, digest, incarnation, sequence };
         if self.peer_sessions.is_none() {
-            return head.to_bytes(rest);
+            let sequence = self.stats.port.first_sequence() + sequence;
+            return FrameHead { sequence, ..head }.to_bytes(rest);
         }
         let mut bytes = [0; frame::HEAD_BYTES];
         head.write(0, &mut bytes);

@@ -3,12 +3,13 @@
 
 use super::handshake::Handshake;
 use super::opening::{Opened, OpenedHello, Opening};
-use super::peer_sessions::{PeerSessions, Port};
+use super::peer_sessions::PeerSessions;
 use super::rejection::{NotOpened, Rejection};
 use super::tally::Tally;
 use crate::frame::{self, BadFrame, FrameHead, NodeIndex};
 use crate::inbound::{Envelope, Inbound};
 use crate::link::SILENT_AFTER_NS;
+use crate::port::Port;
 use crate::report::{Deliver, Mismatch, RouterEvent};
 use crate::stats::Stats;
 use std::sync::Arc;

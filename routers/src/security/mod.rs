@@ -51,13 +51,14 @@ mod sealing;
 mod tally;
 mod unverified;
 
+pub use crate::port::Port;
 pub use gate::{ASK_EVERY_NS, Gate, OutgoingHello};
 pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Handshake, HelloOutcome, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use hello_queue::{HELLO_SLOT_BYTES, HelloQueue};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 pub use opening::{Opened, OpenedHello, Opening};
-pub use peer_sessions::{PeerSessions, Port, RouterIdentity};
+pub use peer_sessions::{PeerSessions, RouterIdentity};
 pub use random::{NoRandom, random};
 pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;

@@ -3,12 +3,13 @@
 use super::HELLO_DATAGRAM_BYTES;
 use super::hello::Hello;
 use super::keys::Endpoint;
-use super::peer_sessions::{Known, PeerSessions, Port};
+use super::peer_sessions::{Known, PeerSessions};
 use super::rejection::{NotOpened, Rejection};
 use super::seal::{self, Seal};
 use super::unverified::UnverifiedIncarnations;
 use crate::frame::{FrameHead, FrameKind, NodeIndex};
 use crate::inbound::window::{Arrival, SequenceWindow};
+use crate::port::Port;
 use std::sync::Arc;
 
 /// A datagram with a valid seal.

@@ -6,30 +6,14 @@ use super::seal::{self, Seal};
 use super::tally::Rejections;
 use super::{HELLO_BYTES, HELLO_DATAGRAM_BYTES};
 use crate::frame::{FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
+use crate::port::Port;
 use crate::settings::Settings;
 use rohrpost_mailbox::SeqCount;
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// Which of a router's ports: each has keys and sequences of its own.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(usize)]
-pub enum Port {
-    /// Packages.
-    Packages = 0,
-    /// Time.
-    Time = 1,
-    /// Packages that are not real time.
-    Rest = 2,
-    /// What the two ends of a replica send to each other.
-    Replicas = 3,
-}
-
 impl Port {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Packages, Self::Time, Self::Rest, Self::Replicas];
-
     pub(super) fn purpose(self) -> Purpose {
         match self {
             Self::Packages => Purpose::Packages,

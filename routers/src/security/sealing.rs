@@ -1,9 +1,10 @@
 //! The half that seals: one for each port, in the thread that sends there.
 
 use super::keys::Endpoint;
-use super::peer_sessions::{Known, PeerSessions, Port};
+use super::peer_sessions::{Known, PeerSessions};
 use super::seal::{self, Seal};
 use crate::frame::{self, FrameHead, NodeIndex};
+use crate::port::Port;
 use std::sync::Arc;
 
 /// No incarnation of the peer has answered a challenge yet, so nothing can be sealed to it.

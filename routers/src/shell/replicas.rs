@@ -171,7 +171,7 @@ impl Shell {
         if sender.is_empty() {
             return Ok(());
         }
-        let stats = Stats::of_rest(&settings, &self.stats);
+        let stats = Stats::of_port(Port::Replicas, &settings, &self.stats);
         self.replica_stats = Some(stats.clone());
         let awaits = self.slot_parts.is_none().then(|| sending.clone());
         let delivery = ReplicaDelivery { receiver, clock: SystemClock::open(node), sending: awaits };

@@ -83,7 +83,7 @@ impl Shell {
         let port = settings.network.rest_port();
         let own = (settings.nodes[usize::from(settings.own)].address, port).into();
         let socket = Arc::new(InSocket::kept(socket, own, &settings.peer_addresses(), REST_BYTES)?);
-        let stats = Stats::of_rest(&settings, &self.stats);
+        let stats = Stats::of_port(Port::Rest, &settings, &self.stats);
         let all = self.peer_sessions.as_ref();
         let mut outbound = Outbound::new(&settings, stats.clone()).behind(&self.stats);
         if let Some(all) = all {

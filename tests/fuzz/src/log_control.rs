@@ -1,5 +1,5 @@
 //! Log control: what a connection says to a recorder, divided in any way. Each line is a command that reads back as the
-//! same, or is told what is wrong with it, in one line of ASCII.
+//! same, or is told what is wrong with it, in one line of ASCII; and nothing is read behind that.
 
 use crate::split::Bytes;
 use rohrpost_recording::{CONTROL_LINE_BYTES_MAX, ControlAnswer, ControlCommand, ControlError, ControlLines};
@@ -16,6 +16,7 @@ pub(crate) fn run(data: &[u8]) {
     assert_eq!(read(said, &parts), at_once, "in parts of {parts:?}");
     let lines = said.iter().filter(|byte| **byte == b'\n').count();
     assert!(at_once.len() <= lines + 1, "one answer a line, and one for a last line without end");
+    assert!(at_once.iter().rev().skip(1).all(Result::is_ok), "nothing is obeyed behind what is no command");
     at_once.iter().for_each(check);
 }
 

@@ -285,11 +285,21 @@ fn where_nothing_is_reordered_nothing_is_late_however_many_flows_there_are() {
 
 #[test]
 fn what_a_router_could_have_sent_parts_no_nodes_and_loses_nothing() {
+    parts_no_nodes("what_a_router_could_have_sent", Plan::forged, "forged");
+}
+
+#[test]
+fn what_is_for_another_port_parts_no_nodes_and_loses_nothing() {
+    parts_no_nodes("what_is_for_another_port", Plan::strayed, "strayed");
+}
+
+/// Networks in which nothing goes wrong but what is seen by this name.
+fn parts_no_nodes(test: &str, plan: fn(u64) -> Plan, fault: &str) {
     if let Some(seed) = number("ROHRPOST_SIM_SEED") {
-        return replay(Plan::forged(seed));
+        return replay(plan(seed));
     }
     let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS) / 4;
-    let seen = keep_promises("what_a_router_could_have_sent", seeds, Plan::forged);
+    let seen = keep_promises(test, seeds, plan);
     for lost in ["stale", "silent", "refused", "late", "lost on the wire"] {
         assert_eq!(seen.get(lost), None, "{lost}");
     }
@@ -300,7 +310,7 @@ fn what_a_router_could_have_sent_parts_no_nodes_and_loses_nothing() {
         let anyway = calm.iter().filter_map(|seen| seen.get(lost)).sum::<u64>();
         assert_eq!(seen.get(lost).copied().unwrap_or_default(), anyway, "{lost}");
     }
-    saw_enough(&seen, seeds, &[("delivered", 10_000), ("forged", 1_000)]);
+    saw_enough(&seen, seeds, &[("delivered", 10_000), (fault, 1_000)]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
-//! Log control by TCP: connections that the runtime watches. A slow or silent one holds nobody up.
+//! Log control by TCP: connections that the runtime watches. A slow or silent one holds nobody up, and ends.
 
-use super::client::ControlClient;
+use super::client::{ControlClient, WITHIN};
 use rohrpost::{Context, Interest, Ready, Watch};
 use rohrpost_recording::{ControlAnswer, ControlCommand, ControlError};
 use std::io::{self, ErrorKind, Write};
@@ -9,8 +9,6 @@ use std::time::{Duration, Instant};
 
 /// Connections at a time.
 const CLIENTS_MAX: usize = 8;
-/// When all are taken, a new one replaces the one that was silent the longest, if that is so long.
-const SILENT: Duration = Duration::from_secs(60);
 /// A socket that cannot be had is tried again after so long.
 const RETRY: Duration = Duration::from_secs(5);
 
@@ -112,9 +110,10 @@ impl ControlServer {
         }
     }
 
-    /// Has the runtime wait for what is next; connections that are over are forgotten.
-    pub(in crate::logd) fn watch(&mut self, context: &mut Context) {
+    /// Has the runtime wait for what is next; connections that are over, or took too long, are forgotten.
+    pub(in crate::logd) fn watch(&mut self, context: &mut Context, now: Instant) {
         self.clients.retain_mut(|client| {
+            client.look(now);
             let lives = client.watch(context);
             if !lives {
                 client.forget(context);
@@ -127,7 +126,7 @@ impl ControlServer {
     fn accept(&mut self, context: &mut Context, now: Instant) {
         let Some(listener) = &self.listener else { return };
         match listener.accept() {
-            Ok((socket, _)) => self.take_in(socket, context, now),
+            Ok((socket, _)) => self.take_in(socket, now),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
             Err(error) => {
                 // It stays ready meanwhile, and must not keep the module busy.
@@ -139,69 +138,21 @@ impl ControlServer {
         }
     }
 
-    fn take_in(&mut self, socket: TcpStream, context: &mut Context, now: Instant) {
+    fn take_in(&mut self, socket: TcpStream, now: Instant) {
         if self.clients.len() >= CLIENTS_MAX {
-            match replaceable(&self.clients, now) {
-                Some(at) => self.clients.remove(at).forget(context),
-                None => return refuse(socket),
-            }
+            return refuse(socket);
         }
         // One that has no descriptor is gone at once.
         self.clients.extend(ControlClient::new(socket, now));
     }
 }
 
-/// The connection that makes room for another one.
-fn replaceable(clients: &[ControlClient], now: Instant) -> Option<usize> {
-    let silent = clients.iter().map(|client| client.silent(now)).enumerate();
-    silent.filter(|(_, silent)| *silent >= SILENT).max_by_key(|(_, silent)| *silent).map(|(at, _)| at)
-}
-
 /// Says why, if that goes without waiting.
 fn refuse(mut socket: TcpStream) {
-    let why = ControlAnswer::err(&format!("{CLIENTS_MAX} connections are open already; close one"));
+    let s = WITHIN.as_secs();
+    let why = format!("{CLIENTS_MAX} connections are open already; close one, or try again in {s} s");
+    let why = ControlAnswer::err(&why);
     if socket.set_nonblocking(true).is_ok() {
         let _ = socket.write_all(format!("{}\n", why.line()).as_bytes());
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::io::Read;
-
-    /// Connections that all are there, and their other ends.
-    fn connected(now: Instant) -> (Vec<ControlClient>, Vec<TcpStream>) {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap();
-        let pair = |_| {
-            let other = TcpStream::connect(address).unwrap();
-            (ControlClient::new(listener.accept().unwrap().0, now).unwrap(), other)
-        };
-        (0..CLIENTS_MAX).map(pair).unzip()
-    }
-
-    /// Nothing is heard of an order that takes long, either.
-    #[test]
-    fn connections_that_take_no_answers_make_room_and_those_that_wait_for_one_do_not() {
-        let began = Instant::now();
-        let (mut clients, mut others) = connected(began);
-        let answer = ControlAnswer::ok().with_text("text", &"x".repeat(100_000));
-        for client in &mut clients {
-            while !client.has_rest() {
-                client.answer(&answer, began);
-            }
-        }
-        assert_eq!(replaceable(&clients, began + SILENT / 2), None, "not so soon");
-        let later = began + SILENT;
-        assert!(replaceable(&clients, later).is_some());
-        // One of them goes on reading, however slowly.
-        let mut taken = vec![0; 10_000_000];
-        while clients[0].silent(later) > Duration::ZERO {
-            assert!(others[0].read(&mut taken).unwrap() > 0);
-            clients[0].move_bytes(later);
-        }
-        clients[1..].iter_mut().for_each(|client| client.wait_for(1));
-        assert_eq!(replaceable(&clients, later), None);
     }
 }

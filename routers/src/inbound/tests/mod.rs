@@ -3,6 +3,7 @@
 mod incarnations;
 mod names;
 mod pair;
+mod ports;
 mod refusals;
 
 use super::order::Order;
@@ -153,34 +154,4 @@ proptest! {
             }
         }
     }
-}
-
-/// Two routers claim one node: the one that is heard at the real-time port is heard at the other, too.
-#[test]
-fn the_real_time_port_decides_which_incarnation_lives() {
-    let mut end = End::new(0, |_| {});
-    let rest = Stats::of_rest(&end.settings, &end.stats);
-    let mut inbound = Inbound::new(&end.settings, rest.clone());
-    let mut hear = |end: &mut End, incarnation, sequence| {
-        let digest = end.settings.digest;
-        let head = FrameHead {
-            kind: crate::frame::FrameKind::Alive,
-            system: 1,
-            from: 1,
-            to: 0,
-            digest,
-            incarnation,
-            sequence,
-        };
-        let (told, before) = ([0; 24], rest.peer(1).received.datagrams.get());
-        let bytes = [&head.to_bytes(&[&told])[..], &told].concat();
-        let datagram = Datagram { source: crate::harness::address(1), arrived_ns: START, bytes: &bytes };
-        inbound.handle(START, &datagram, &mut end.log);
-        rest.peer(1).received.datagrams.get() > before
-    };
-    assert!(hear(&mut end, 5, 0), "nobody is known yet");
-    end.stats.peer(1).link.incarnation.set(6);
-    assert!(!hear(&mut end, 5, 1), "another was heard there");
-    assert!(hear(&mut end, 6, 0));
-    assert_eq!(rest.peer(1).received.old.get(), 1);
 }

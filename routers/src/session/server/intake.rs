@@ -85,7 +85,8 @@ impl Server {
         if let Some(Difference { reason, digests, holder }) = self.difference(hello) {
             return self.refuse(now_ns, client, reason, digests, &holder, host);
         }
-        let older = self.places.of_incarnation(hello.incarnation);
+        let owner = self.member(client).map(|member| &member.principal);
+        let older = owner.and_then(|owner| self.places.of_incarnation(owner, hello.incarnation));
         if let Some((older, attempt)) = older.and_then(|older| Some((older, self.member(older)?.attempt))) {
             if attempt >= hello.attempt {
                 return self.refuse(now_ns, client, SessionRefusalReason::Replaced, (0, 0), "", host);

@@ -8,7 +8,7 @@
 
 use super::connections::ConnectionsByOwner;
 use super::member::{Member, MemberState};
-use super::principal::{Principal, Principals};
+use super::principal::{Principal, PrincipalId, Principals};
 use super::work::WORK_SHARE;
 use super::{Server, ServerHost};
 use crate::session::ClientIndex;
@@ -39,8 +39,8 @@ pub(super) struct Places {
     handshakes: ConnectionsByOwner<Principal>,
     /// Admitted clients.
     pub(super) principals: Principals,
-    /// Admitted clients, by incarnation.
-    incarnations: BTreeMap<u64, ClientIndex>,
+    /// Admitted clients, by principal and incarnation.
+    incarnations: BTreeMap<(PrincipalId, u64), ClientIndex>,
     /// Admitted clients, by system.
     systems: BTreeSet<(u8, ClientIndex)>,
     pub(super) crowded: Crowded,
@@ -53,17 +53,20 @@ impl Places {
         self.systems.range(least..).next().filter(|(of, _)| *of == system).map(|(_, client)| *client)
     }
 
-    /// The client with this incarnation.
-    pub(super) fn of_incarnation(&self, incarnation: u64) -> Option<ClientIndex> {
-        self.incarnations.get(&incarnation).copied()
+    /// The client of a principal with this incarnation. Another principal may say that it is of the same: it names one
+    /// of its own thereby.
+    pub(super) fn of_incarnation(&self, owner: &Principal, incarnation: u64) -> Option<ClientIndex> {
+        let id = self.principals.id_of(owner)?;
+        self.incarnations.get(&(id, incarnation)).copied()
     }
 
     /// It does not take part any more.
     pub(super) fn leaves(&mut self, now_ns: u64, client: ClientIndex, member: &Member) {
         self.principals.leaves(now_ns, member.principal_id, member.began_ns, client);
         self.systems.remove(&(member.system, client));
-        if self.incarnations.get(&member.incarnation) == Some(&client) {
-            self.incarnations.remove(&member.incarnation);
+        let incarnation = (member.principal_id, member.incarnation);
+        if self.incarnations.get(&incarnation) == Some(&client) {
+            self.incarnations.remove(&incarnation);
         }
     }
 
@@ -131,7 +134,7 @@ impl Server {
         }
         let is_node = member.certified.is_some() || is_own && self.settings.own_nodes.has(hello.name);
         member.party = if is_node { hello.system.into() } else { STRANGERS + member.principal_id };
-        self.places.incarnations.insert(member.incarnation, client);
+        self.places.incarnations.insert((member.principal_id, member.incarnation), client);
         self.places.systems.insert((member.system, client));
         true
     }

@@ -25,7 +25,7 @@ use world::{MS, S, World};
 const WELL_NS: u64 = 10 * S;
 const SEEDS: u64 = 30;
 /// What must have been seen in each ten networks.
-const SEEN_IN_TEN: [(&str, u64); 19] = [
+const SEEN_IN_TEN: [(&str, u64); 20] = [
     ("routers-own", 50),
     ("delivered", 5000),
     ("to all", 300),
@@ -45,6 +45,7 @@ const SEEN_IN_TEN: [(&str, u64); 19] = [
     ("line faults", 50),
     ("posted", 20_000),
     ("replaced", 20),
+    ("impostors", 20),
 ];
 
 /// One seed: all goes wrong for a while, then all must be well.

@@ -198,6 +198,49 @@ fn one_address_does_not_push_others_out_before_their_hello() {
     assert!(ground.server.crowded().handshakes > 3);
 }
 
+/// A connection says hello as a client in this attempt, behind the certificate that it shows; its place.
+fn says_hello(
+    ground: &mut Ground,
+    (settings, attempt): (ClientSettings, u64),
+    (from, certificate): (usize, Option<(u8, &str)>),
+) -> ClientIndex {
+    let mut end = crate::session::client::Client::new(settings, Vec::new(), ground.now_ns);
+    (0..attempt).for_each(|_| end.connected(ground.now_ns));
+    let place = ground.server.accept(ground.now_ns, address(from, attempt), &mut ground.said).unwrap();
+    if let Some((system, name)) = certificate {
+        ground.server.certify(place, system, name, Rights::any());
+    }
+    ground.server.received(ground.now_ns, place, end.ready(), &mut ground.said);
+    place
+}
+
+/// An incarnation is no secret: it stands in each hello.
+#[test]
+fn nobody_takes_the_place_of_a_client_of_another_principal() {
+    let own = || client_settings(0, 100);
+    let of_other_system = || ClientSettings { system: 2, system_digest: 22, ..own() };
+    let (node, other) = (Some((1, "node a of system 1")), Some((1, "node b of system 1")));
+    let foreign = Some((2, "node a of system 2"));
+    for (first, then, settings, replaces, what) in [
+        ((0, None), (0, None), own(), true, "a later connection from the same address"),
+        ((0, None), (9, None), own(), false, "from another address"),
+        ((0, None), (0, node), own(), false, "with a certificate, where the first has none"),
+        ((0, node), (9, node), own(), true, "with the same certificate, from anywhere"),
+        ((0, node), (0, other), own(), false, "with a certificate of another node"),
+        ((0, node), (0, foreign), of_other_system(), false, "with a certificate of another system"),
+        ((0, node), (0, None), own(), false, "without a certificate"),
+    ] {
+        let mut ground = Ground::with_room((16, 4), []);
+        let victim = says_hello(&mut ground, (own(), 1), first);
+        let later = says_hello(&mut ground, (settings, 2), then);
+        let are_members = (is_member(&ground, victim), is_member(&ground, later));
+        assert_eq!(are_members, (!replaces, true), "{what}: {:?}", ground.said.events);
+        // Nor does it keep the first one out, when that comes again.
+        let again = says_hello(&mut ground, (own(), 3), first);
+        assert!(is_member(&ground, again), "{what}: {:?}", ground.said.events);
+    }
+}
+
 #[test]
 fn of_what_one_client_hosts_no_other_gets_a_part() {
     let inside = Range::module(Name::new(1, 104, 0, 0));

@@ -123,6 +123,15 @@ pub enum Fault {
         /// How many.
         count: u64,
     },
+    /// Datagrams such as a router sends to another port come to that of packages, one behind the other.
+    Stray {
+        /// The node that they name as their sender.
+        from: usize,
+        /// The receiver.
+        to: usize,
+        /// How many.
+        count: u64,
+    },
     /// A node sends another one parts of records and requests that nobody should send.
     Parts {
         /// The sender.

@@ -15,6 +15,7 @@ use super::world::{Event, World};
 use rohrpost_mailbox::{Head, Name, Priority, Type, local};
 use rohrpost_routers::admission::{PACKET, TUNNEL};
 use rohrpost_routers::frame::{self, Alive, FrameHead, FrameKind, Refusal, RefusalReason};
+use rohrpost_routers::security::Port as RouterPort;
 use std::rc::Rc;
 
 /// The last that a router could send.
@@ -105,6 +106,16 @@ impl World<'_> {
                     self.at(at_ns, Event::Arrive { to, arrived });
                 }
             }
+            Fault::Stray { from, to, count } => {
+                self.oracle.saw("strayed");
+                let first = self.chance.pick(&[RouterPort::Rest, RouterPort::Replicas]).first_sequence();
+                let first = first + self.chance.below(1 << 20);
+                for sequence in first..first + count {
+                    let arrived = made(0, Some(from), self.alive(from, to, sequence));
+                    let at_ns = self.now_ns + self.chance.below(50 * MS);
+                    self.at(at_ns, Event::Arrive { to, arrived });
+                }
+            }
             Fault::Replay { to, count } => {
                 for _ in 0..count.min(self.old.len() as u64) {
                     let (receiver, life, arrived) = self.chance.pick_ref(&self.old).clone();
@@ -165,7 +176,7 @@ impl World<'_> {
             Fault::Unsendable { node } => self.stations[node].host.unsendable -= 1,
             Fault::Echo { to, .. } => self.stations[to].echo_ns = None,
             Fault::Step { .. } | Fault::Foreign { .. } | Fault::Forged { .. } | Fault::Replay { .. } => {}
-            Fault::Intruder { .. } | Fault::Parts { .. } => {}
+            Fault::Intruder { .. } | Fault::Parts { .. } | Fault::Stray { .. } => {}
         }
     }
 
@@ -269,6 +280,22 @@ impl World<'_> {
             sequence: if is_of_incarnation { sequence } else { chance.below(1 << 20) },
         };
         let rest = Alive { heard_incarnation: chance.bits(), ..Alive::default() }.to_bytes();
+        Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat())
+    }
+
+    /// "Still there", of the present incarnation of a node.
+    fn alive(&self, from: usize, to: usize, sequence: u64) -> Rc<[u8]> {
+        let life = self.stations[from].router.as_ref().map_or(0, |router| router.life);
+        let head = FrameHead {
+            kind: FrameKind::Alive,
+            system: super::plan::SYSTEM,
+            from: from as u8,
+            to: to as u8,
+            digest: digest(self.stations[to].edition),
+            incarnation: incarnation(self.plan.seed, life),
+            sequence,
+        };
+        let rest = Alive::default().to_bytes();
         Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat())
     }
 

@@ -1,10 +1,15 @@
 //! What goes wrong: streams that stall, break or die, clients that freeze, ends that start anew.
 
 use super::{MS, S, World};
+use crate::session::ClientIndex;
 use crate::session::client::Client;
-use crate::session::server::Server;
+use crate::session::server::{MemberState, Server};
+use crate::session::tests::oracle::Teller;
 use crate::session::tests::pipe::Pipe;
-use crate::session::tests::plan::{client_settings, ranges, server_settings};
+use crate::session::tests::plan::{address, client_settings, ranges, server_settings};
+
+/// Its address is none of a client.
+const IMPOSTOR: usize = 250;
 
 impl World {
     pub(super) fn fail(&mut self) {
@@ -40,6 +45,31 @@ impl World {
                     _ => self.break_connection(client),
                 }
             }
+        }
+    }
+
+    /// Somebody at an address of its own says hello as the present incarnation of a client, and goes again. Nobody
+    /// loses its place by that.
+    pub(super) fn impersonate(&mut self) {
+        let is_there = self.may_fail && self.now_ns >= self.server_down_until_ns;
+        if !is_there || !self.impostors.per_million(500) {
+            return;
+        }
+        let index = self.impostors.below(self.nodes.len() as u64) as usize;
+        let (node, now_ns) = (&self.nodes[index], self.server_clock.at(self.now_ns).monotonic_ns);
+        let mut impostor = Client::new(client_settings(index, node.incarnation), Vec::new(), now_ns);
+        (0..=self.impostors.below(2 * node.attempts + 2)).for_each(|_| impostor.connected(now_ns));
+        let line = self.rings.as_mut().map(|rings| &mut rings.server.line);
+        let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.impostors, line };
+        let before = members(&self.server);
+        let Some(place) = self.server.accept(now_ns, address(IMPOSTOR, 0), &mut teller) else { return };
+        self.server.received(now_ns, place, impostor.ready(), &mut teller);
+        let after = members(&self.server);
+        self.server.closed(now_ns, place, &mut teller);
+        self.server_wake_ns = 0;
+        self.oracle.saw("impostors");
+        if !before.iter().all(|client| after.contains(client)) {
+            self.oracle.broken(format!("somebody else takes the place of client {index} by its incarnation"));
         }
     }
 
@@ -91,4 +121,9 @@ impl World {
             connection.down.is_dead = true;
         }
     }
+}
+
+/// Clients that take part.
+fn members(server: &Server) -> Vec<ClientIndex> {
+    server.clients().filter(|(_, _, state)| *state == MemberState::Member).map(|(client, _, _)| client).collect()
 }

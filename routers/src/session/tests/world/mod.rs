@@ -50,6 +50,7 @@ pub(super) struct World {
     faults: Chance,
     posts: Chance,
     host: Chance,
+    impostors: Chance,
     pub(super) may_fail: bool,
     pub(super) may_post: bool,
 }
@@ -87,6 +88,7 @@ impl World {
             faults: chance.fork(),
             posts: chance.fork(),
             host: chance.fork(),
+            impostors: Chance::new(!plan.seed),
             may_fail,
             may_post: true,
             plan,
@@ -99,6 +101,7 @@ impl World {
             self.now_ns += MS;
             self.oracle.now_ns = self.now_ns;
             self.fail();
+            self.impersonate();
             self.post();
             self.turn_rings();
             self.carry();

@@ -113,6 +113,16 @@ pub(crate) const FORGED: Group = Group {
             )],
         },
         Planted {
+            name: "TakesOtherPorts",
+            text: "Inbound: what is for another port is taken for what its sender says at this one.",
+            shows_in: "inbound::tests::ports::what_is_for_another_port_changes_nothing_of_its_sender",
+            edits: &[edit(
+                "inbound/mod.rs",
+                "if !port.has_sequence(head.sequence) {",
+                "if !port.has_sequence(head.sequence) && !broken!(TakesOtherPorts) {",
+            )],
+        },
+        Planted {
             name: "BelievesRefusals",
             text: "Inbound: one refusal parts this node from a peer that has just said that it hears it.",
             shows_in: "inbound::tests::refusals::refusals_of_a_peer_that_hears_us_part_nobody",

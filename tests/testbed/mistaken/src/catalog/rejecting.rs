@@ -34,11 +34,11 @@ pub(crate) const REJECTING: Group = Group {
             shows_in: "inbound::tests::a_package_in_parts_is_late_only_if_something_newer_of_its_flow_went_before_it",
             edits: &[edit(
                 "inbound/peer.rs",
-                "return first.is_some() || self.is_plausible(now_ns, head);",
+                "return first.is_some() || self.is_plausible(now_ns, head, is_silent);",
                 r"if broken!(RejectsAsOld) && head.sequence < self.window.next() {
                 return false;
             }
-            return first.is_some() || self.is_plausible(now_ns, head);",
+            return first.is_some() || self.is_plausible(now_ns, head, is_silent);",
             )],
         },
         Planted {

@@ -81,6 +81,20 @@ pub(crate) const SESSION: Group = Group {
             )],
         },
         Planted {
+            name: "ReplacesOthers",
+            text: "Session: a client takes the place of any that says the same incarnation.",
+            shows_in: "session::tests::shares::nobody_takes_the_place_of_a_client_of_another_principal",
+            edits: &[edit(
+                "session/server/places.rs",
+                "let id = self.principals.id_of(owner)?;",
+                r"if broken!(ReplacesOthers) {
+            let mut all = self.incarnations.iter();
+            return all.find(|((_, its), _)| *its == incarnation).map(|(_, client)| *client);
+        }
+        let id = self.principals.id_of(owner)?;",
+            )],
+        },
+        Planted {
             name: "CrowdsOut",
             text: "Session: of too many connections, those of the principal with most do not give way.",
             shows_in: "session::tests::shares::one_address_does_not_push_others_out_before_their_hello",

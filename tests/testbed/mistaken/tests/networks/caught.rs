@@ -11,6 +11,8 @@ pub(crate) enum Network {
     Rough,
     Crowded,
     Forged,
+    /// What is for another port comes to that of packages.
+    Strayed,
     /// Sealed, with a program that writes what it likes in its heads, and a router that lets it.
     Intruded,
     Unsteady,
@@ -35,6 +37,7 @@ impl Network {
             Self::Rough => Plan::rough(seed),
             Self::Crowded => Plan::crowded(seed),
             Self::Forged => Plan::forged(seed),
+            Self::Strayed => Plan::strayed(seed),
             Self::Intruded => Plan::new(4 * seed + 2).sealed(),
             Self::Unsteady => Plan::unsteady(seed),
             Self::Slotted => Plan::slotted(seed),
@@ -92,6 +95,7 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::BelievesIncarnations, Promise::Recovery, Network::Forged, 0),
     caught(Mistake::BelievesJumps, Promise::Recovery, Network::Forged, 0),
     caught(Mistake::BelievesRefusals, Promise::Recovery, Network::Forged, 0),
+    caught(Mistake::TakesOtherPorts, Promise::Recovery, Network::Strayed, 1),
     caught(Mistake::AdmitsHurry, Promise::Admission, Network::Intruded, 0),
     caught(Mistake::AdmitsForeignNames, Promise::Admission, Network::Intruded, 0),
     caught(Mistake::AdmitsRoutersOwn, Promise::Admission, Network::Intruded, 0),

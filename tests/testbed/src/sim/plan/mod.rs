@@ -259,11 +259,22 @@ impl Plan {
 
     /// Whether each datagram comes behind all that its sender sent before it.
     pub fn is_in_order(&self) -> bool {
-        self.quality.reorder_ppm == 0 && self.faults.iter().all(|its| matches!(its.fault, Fault::Forged { .. }))
+        let is_deceit = |its: &Planned| matches!(its.fault, Fault::Forged { .. } | Fault::Stray { .. });
+        self.quality.reorder_ppm == 0 && self.faults.iter().all(is_deceit)
     }
 
     /// A network in which nothing goes wrong but that somebody sends what a router could have sent.
     pub fn forged(seed: u64) -> Self {
+        Self::deceived(seed, |(from, to), count| Fault::Forged { from, to, count })
+    }
+
+    /// A network in which nothing goes wrong but that what routers send to one port comes to another.
+    pub fn strayed(seed: u64) -> Self {
+        Self::deceived(seed, |(from, to), count| Fault::Stray { from, to, count: 1 + count })
+    }
+
+    /// A network in which nothing goes wrong but such faults, of a sender and a receiver.
+    fn deceived(seed: u64, fault: impl Fn((usize, usize), u64) -> Fault) -> Self {
         let mut plan = Self::calm(seed);
         let mut chance = Chance::new(seed ^ 0xf0_9ed);
         for _ in 0..chance.between(10, 100) {
@@ -271,7 +282,7 @@ impl Plan {
             let to = (from + 1 + chance.below(plan.nodes.len() as u64 - 1) as usize) % plan.nodes.len();
             // When all have heard each other.
             let (at_ns, count) = (chance.between(S, plan.traffic_end_ns), chance.scale(1, 20));
-            plan.faults.push(Planned { from_ns: at_ns, until_ns: at_ns, fault: Fault::Forged { from, to, count } });
+            plan.faults.push(Planned { from_ns: at_ns, until_ns: at_ns, fault: fault((from, to), count) });
         }
         plan
     }

@@ -7,6 +7,7 @@ use super::super::world::{Event, World};
 use super::super::{clock::Now, packages::digest, spans::MS};
 use super::leaving::PORT;
 use rohrpost_routers::frame::{DescriptionPart, FrameHead, FrameKind, PART_REQUEST_BYTES_MAX, PartRequest, RecordPart};
+use rohrpost_routers::security::Port as RouterPort;
 
 impl World<'_> {
     /// A node sends another one what it should not.
@@ -14,7 +15,7 @@ impl World<'_> {
         self.oracle.saw("hostile parts");
         let life = self.stations[from].router.as_ref().map_or(0, |router| router.life);
         // Behind all that it has sent there by this port.
-        let first = self.now_ns / 1_000_000;
+        let first = RouterPort::Replicas.first_sequence() + self.now_ns / 1_000_000;
         for number in 0..count {
             let (kind, content) = self.hostile_content();
             let head = FrameHead {

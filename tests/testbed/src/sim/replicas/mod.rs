@@ -36,7 +36,7 @@ use rohrpost_mailbox::{Participant, SystemTime, TimeRecord};
 use rohrpost_routers::driver::{RxDriver, part_for_slot, part_queue};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::replication::{ReplicaReceiver, ReplicaSender};
-use rohrpost_routers::security::{Gate, PeerSessions, Port as SealedPort, Sealing};
+use rohrpost_routers::security::{Gate, PeerSessions, Port as RouterPort, Sealing};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
 use std::rc::Rc;
@@ -69,11 +69,11 @@ impl Replicas {
         let mut sender = ReplicaSender::new(settings, rings.replicas());
         let receiver = ReplicaReceiver::new(settings, rings.replicas(), rings.join(node), Arc::new(Interfaces));
         let receiver = receiver.asking_by(sender.requests());
-        let stats = Stats::of_rest(settings, all);
-        let gate = peer_sessions.map(|all| Gate::without_hellos(all, SealedPort::Replicas));
+        let stats = Stats::of_port(RouterPort::Replicas, settings, all);
+        let gate = peer_sessions.map(|all| Gate::without_hellos(all, RouterPort::Replicas));
         let driver = RxDriver::new(settings, &stats, gate).of_rest();
         let queue = part_queue(settings, &sender, stats.clone(), (all, None), peer_sessions);
-        let seals = peer_sessions.map(|all| (Sealing::new(all, SealedPort::Replicas), all.clone()));
+        let seals = peer_sessions.map(|all| (Sealing::new(all, RouterPort::Replicas), all.clone()));
         Self {
             participant: rings.join(node),
             leaving: Leaving::new(settings, (all.clone(), stats), (queue, seals), sender.counts()),

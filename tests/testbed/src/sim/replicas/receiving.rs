@@ -12,7 +12,7 @@ use rohrpost_routers::frame::{FrameHead, NodeIndex, ReplicaFrame};
 use rohrpost_routers::inbound::Envelope;
 use rohrpost_routers::replication::ReplicaReceiver;
 use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
-use rohrpost_routers::security::{Port as SealedPort, Rejection};
+use rohrpost_routers::security::{Port as RouterPort, Rejection};
 
 /// The thread listens for so long, if nothing comes; and while it waits for parts.
 const LISTEN_NS: u64 = 100 * MS;
@@ -101,7 +101,7 @@ impl Replicas {
         let received = &self.leaving.stats.peer(source).received;
         let rejected = |why| {
             let all = self.leaving.peer_sessions();
-            all.map_or(0, |all| all.rejections(SealedPort::Replicas).of(Some(source), why))
+            all.map_or(0, |all| all.rejections(RouterPort::Replicas).of(Some(source), why))
         };
         let never = [Rejection::Unsealed, Rejection::OtherKey, Rejection::NotOurs, Rejection::Address];
         TakenCounts {
