@@ -42,6 +42,7 @@ mod param;
 mod ping;
 mod published;
 mod quantities;
+mod quota;
 mod record;
 mod replay;
 mod resolved;

@@ -63,7 +63,7 @@ impl Flat {
         match value {
             Value::Map(fields) if way.len() < DEPTH_MAX => {
                 for (name, field) in fields {
-                    self.step(way, name.clone(), field);
+                    self.step(way, name.to_string(), field);
                 }
             }
             Value::List(items) if way.len() < DEPTH_MAX && plotted(items) => {
@@ -73,7 +73,7 @@ impl Flat {
             }
             Value::Variant(case, inner) if way.len() < DEPTH_MAX => {
                 self.line(way, case);
-                self.step(way, case.clone(), inner);
+                self.step(way, case.to_string(), inner);
             }
             // What an absent option or a unit would say is said by the case that holds it.
             Value::Null => {}
@@ -127,7 +127,7 @@ fn brief(value: &Value) -> String {
         Value::Text(text) => cut(text, TEXT_MAX).into(),
         Value::Bytes(bytes) => format!("{} bytes", bytes.len()),
         Value::Map(fields) => format!("{} fields", fields.len()),
-        Value::Variant(case, _) => case.clone(),
+        Value::Variant(case, _) => case.to_string(),
         Value::List(items) => list(items),
     }
 }

@@ -1,5 +1,6 @@
 //! Journals in a recording, put together of their pieces: each in a file, however long it is.
 
+use crate::quota::UnpackedQuota;
 use crate::record::ProgressLine;
 use crate::terminal::Failure;
 use rohrpost::output::plain;
@@ -33,13 +34,19 @@ pub(super) struct RecordedRun {
 struct PiecedRuns<'a> {
     runs: Vec<RecordedRun>,
     folder: &'a Path,
+    quota: &'a mut UnpackedQuota,
     /// The file of the run to which a piece was added last.
     open: Option<(usize, File)>,
 }
 
 /// Journals of these modules, or of all, in the order in which they begin; put together in that folder.
-pub(super) fn read(file: &Path, modules: &[String], folder: &Path) -> Result<Vec<RecordedRun>, Failure> {
-    let mut pieced = PiecedRuns::new(folder);
+pub(super) fn read(
+    file: &Path,
+    modules: &[String],
+    folder: &Path,
+    quota: &mut UnpackedQuota,
+) -> Result<Vec<RecordedRun>, Failure> {
+    let mut pieced = PiecedRuns::new(folder, quota);
     let mut reader = Reader::open(file)?;
     let mut damage = None;
     loop {
@@ -73,7 +80,8 @@ pub(super) fn read(file: &Path, modules: &[String], folder: &Path) -> Result<Vec
 
 /// Those of these modules in files that follow one another, as far as they are whole.
 pub(super) fn of_files(files: &[&Path], modules: &[String], folder: &Path) -> Result<Vec<RecordedRun>, Failure> {
-    let (mut pieced, mut progress) = (PiecedRuns::new(folder), ProgressLine::new());
+    let mut quota = UnpackedQuota::of_files(files);
+    let (mut pieced, mut progress) = (PiecedRuns::new(folder, &mut quota), ProgressLine::new());
     for file in files {
         let mut reader = Reader::open(file)?;
         loop {
@@ -99,8 +107,8 @@ fn is_wanted(channel: &RecordedChannel, modules: &[String]) -> bool {
 }
 
 impl<'a> PiecedRuns<'a> {
-    fn new(folder: &'a Path) -> Self {
-        Self { runs: Vec::new(), folder, open: None }
+    fn new(folder: &'a Path, quota: &'a mut UnpackedQuota) -> Self {
+        Self { runs: Vec::new(), folder, quota, open: None }
     }
 
     fn take(&mut self, channel: &RecordedChannel, value: &[u8]) -> Result<(), Failure> {
@@ -147,6 +155,7 @@ impl<'a> PiecedRuns<'a> {
     }
 
     fn append(&mut self, at: usize, bytes: &[u8]) -> Result<(), Failure> {
+        self.quota.take(bytes.len())?;
         let run = &mut self.runs[at];
         let failed = |error: std::io::Error| format!("{}: {error}", run.journal.display());
         let open = self.open.take().filter(|(of, _)| *of == at).map(|(_, file)| Ok(file));
@@ -220,7 +229,8 @@ mod tests {
     #[test]
     fn a_run_begins_at_nothing_unless_the_file_repeats_it() {
         let folder = tempfile::tempdir().unwrap();
-        let mut pieced = PiecedRuns::new(folder.path());
+        let mut quota = UnpackedQuota::new(1 << 20);
+        let mut pieced = PiecedRuns::new(folder.path(), &mut quota);
         for (is_repeated, offset, bytes) in [
             (false, 7, &b"late"[..]),
             (false, 0, b"a"),
@@ -241,7 +251,8 @@ mod tests {
     #[test]
     fn too_many_runs_are_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let mut pieced = PiecedRuns::new(folder.path());
+        let mut quota = UnpackedQuota::new(1 << 20);
+        let mut pieced = PiecedRuns::new(folder.path(), &mut quota);
         let channel = channel("pilot.0", false);
         let mut begin = |incarnation| pieced.take(&channel, &record(incarnation, 9, b"late"));
         (0..RUNS_MAX as u32).for_each(|incarnation| begin(incarnation).unwrap());
@@ -249,9 +260,22 @@ mod tests {
     }
 
     #[test]
+    fn a_journal_takes_no_more_disk_than_it_may() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut quota = UnpackedQuota::new(5);
+        let mut pieced = PiecedRuns::new(folder.path(), &mut quota);
+        let channel = channel("pilot.0", false);
+        pieced.take(&channel, &record(5, 0, b"abc")).unwrap();
+        let told = pieced.take(&channel, &record(5, 3, b"def")).unwrap_err().to_string();
+        assert!(told.starts_with("what is to be unpacked of it takes more than 5 B on the disk"), "{told}");
+        assert_eq!(std::fs::read_to_string(&pieced.runs[0].journal).unwrap(), "abc");
+    }
+
+    #[test]
     fn pieces_are_put_together_until_one_is_missing() {
         let folder = tempfile::tempdir().unwrap();
-        let mut pieced = PiecedRuns::new(folder.path());
+        let mut quota = UnpackedQuota::new(1 << 20);
+        let mut pieced = PiecedRuns::new(folder.path(), &mut quota);
         for (module, incarnation, offset, bytes) in [
             ("pilot.0", 5, 0, &b"ab"[..]),
             ("mapper.0", 6, 9, b"x"),

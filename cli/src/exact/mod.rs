@@ -12,6 +12,7 @@ mod program;
 mod records;
 
 use crate::demo::Folder;
+use crate::quota::UnpackedQuota;
 use crate::terminal::{Failure, complain, say};
 pub(super) use answers::JournalAnswers;
 use journals::RecordedRun;
@@ -42,12 +43,14 @@ pub(super) struct ExactArguments {
 
 pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
     let folder = Folder::new()?;
-    let runs = journals::read(&arguments.file, &arguments.modules, folder.path())?;
+    let file = arguments.file.as_path();
+    let mut quota = UnpackedQuota::of_files(&[file]);
+    let runs = journals::read(file, &arguments.modules, folder.path(), &mut quota)?;
     if arguments.list {
         runs.iter().try_for_each(list)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let records = records::collect(&arguments.file, &runs, folder.path())?;
+    let records = records::collect(file, &runs, folder.path(), &mut quota)?;
     let programs = ExactPrograms::new(arguments.program.clone(), arguments.folder.clone(), records);
     let mut code = ExitCode::SUCCESS;
     for run in &runs {

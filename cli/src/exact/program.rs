@@ -2,6 +2,7 @@
 
 use super::journals::RecordedRun;
 use crate::demo::{Folder, is_built_in, write_map};
+use crate::quota::check_shared;
 use crate::terminal::Failure;
 use rohrpost_config::{Program, find_program};
 use rohrpost_modules::journal::{ExactRun, ReplayReport, VARIABLE};
@@ -59,6 +60,7 @@ impl ExactPrograms {
         let (installation, name) = run.installation(exact)?;
         let own = std::env::current_exe().map_err(|error| error.to_string())?;
         let module = installation.module(name).ok_or("the configuration does not have the module")?;
+        check_shared(module.memory()).map_err(|error| error.to_string())?;
         let command = match (&self.program, &module.program) {
             (Some(program), Program::Command(words)) => {
                 let mut command = Command::new(program);

@@ -1,6 +1,7 @@
 //! Records that journals name instead of their bytes: taken out of the recording, for the programs that are given them.
 
 use super::journals::RecordedRun;
+use crate::quota::UnpackedQuota;
 use crate::terminal::Failure;
 use rohrpost_modules::journal::{RecordSum, RecordWriter};
 use rohrpost_recording::Reader;
@@ -9,7 +10,12 @@ use std::path::{Path, PathBuf};
 
 /// The file in that folder that has all of them; none if there are none. What the recording lacks is told by the replay
 /// that comes to it.
-pub(super) fn collect(recording: &Path, runs: &[RecordedRun], folder: &Path) -> Result<Option<PathBuf>, Failure> {
+pub(super) fn collect(
+    recording: &Path,
+    runs: &[RecordedRun],
+    folder: &Path,
+    quota: &mut UnpackedQuota,
+) -> Result<Option<PathBuf>, Failure> {
     let mut missing = BTreeSet::new();
     for run in runs.iter().filter(|run| run.begins_late.is_none()) {
         missing.extend(run.exact().named_records()?);
@@ -27,6 +33,7 @@ pub(super) fn collect(recording: &Path, runs: &[RecordedRun], folder: &Path) -> 
         }
         let sum = RecordSum::of(message.data);
         if missing.remove(&sum) {
+            quota.take(message.data.len())?;
             records.add(sum, message.data)?;
         }
     }

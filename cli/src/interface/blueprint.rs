@@ -175,8 +175,8 @@ impl<'a> Body<'a> {
 #[derive(Default)]
 struct Types<'a> {
     all: Vec<NamedType<'a>>,
-    /// Place of each by its bytes, texts included.
-    places: HashMap<Vec<u8>, usize>,
+    /// Place of each, texts included.
+    places: HashMap<&'a Type, usize>,
 }
 
 impl<'a> Types<'a> {
@@ -289,7 +289,7 @@ impl<'a> Types<'a> {
 
     fn keep(&mut self, made: NamedType<'a>) -> Layout {
         let all = &mut self.all;
-        let place = *self.places.entry(made.ty.to_bytes()).or_insert_with(|| {
+        let place = *self.places.entry(made.ty).or_insert_with(|| {
             all.push(made);
             all.len() - 1
         });

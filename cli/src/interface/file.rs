@@ -5,7 +5,8 @@
 
 use rohrpost::output::plain;
 use rohrpost::schema::{
-    DataItem, DataKind, Description, Field, Function, Members, Named, SchemaError, Type, Value, WalkError, encode,
+    DataItem, DataKind, Description, Field, Function, Members, Named, SchemaError, TYPES_MAX, Type, Value, WalkError,
+    encode,
 };
 use serde::Serialize;
 use serde_json::{Map, Value as Json};
@@ -16,6 +17,9 @@ use std::path::Path;
 const FORMAT: u64 = 1;
 /// A description has at most 1 MiB; as JSON it is longer.
 const BYTES_MAX: u64 = 8 << 20;
+/// Values of JSON: a field with all that is said of it has thirteen. As JSON they take a hundred times as much memory
+/// as text, so they are counted before.
+const PARTS_MAX: usize = 16 * TYPES_MAX;
 
 /// Why a file is no interface.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +28,8 @@ pub(super) enum FileError {
     Io(#[from] std::io::Error),
     #[error("more than {} MiB; no interface is so long", BYTES_MAX >> 20)]
     Long,
+    #[error("more than {PARTS_MAX} values of JSON; an interface has at most {TYPES_MAX} types, and needs fewer")]
+    Parts,
     /// Also what nests deeper than the library reads, 128 brackets.
     #[error("no JSON of an interface: {0}")]
     Json(#[from] serde_json::Error),
@@ -82,8 +88,11 @@ pub(super) fn load(file: &Path) -> Result<Description, FileError> {
 
 /// Reads what [`write`] wrote.
 pub(super) fn read(text: &str) -> Result<Description, FileError> {
+    if parts(text) > PARTS_MAX {
+        return Err(FileError::Parts);
+    }
     let json: Json = serde_json::from_str(text)?;
-    let file = FilePlace { path: String::new(), json: &json };
+    let file = FilePlace { above: None, json: &json };
     let keys = ["format", "hash", "name", "class", "text", "functions", "data"];
     let top = file.object(&keys)?;
     let format = top.need("format", "the number of the format")?;
@@ -110,41 +119,75 @@ pub(super) fn read(text: &str) -> Result<Description, FileError> {
     Ok(description)
 }
 
-/// A value in the file, and the way to it.
-struct FilePlace<'a> {
-    path: String,
-    json: &'a Json,
+/// Values of JSON in a text, less the outermost.
+fn parts(text: &str) -> usize {
+    let (mut parts, mut in_text, mut is_escaped) = (0, false, false);
+    for byte in text.bytes() {
+        match byte {
+            _ if is_escaped => is_escaped = false,
+            b'\\' => is_escaped = in_text,
+            b'"' => in_text = !in_text,
+            b',' | b'[' | b'{' if !in_text => parts += 1,
+            _ => {}
+        }
+    }
+    parts
+}
+
+/// A value in the file, and the way to it: from what is above it, by a step. A text is made of it for an error alone.
+struct FilePlace<'p> {
+    above: Option<(&'p FilePlace<'p>, FileStep<'p>)>,
+    json: &'p Json,
+}
+
+#[derive(Clone, Copy)]
+enum FileStep<'p> {
+    Key(&'p str),
+    Element(usize),
 }
 
 /// An object in the file, of which all keys are known.
-struct Object<'a> {
-    path: String,
-    entries: &'a Map<String, Json>,
+struct Object<'p> {
+    place: &'p FilePlace<'p>,
+    entries: &'p Map<String, Json>,
 }
 
-impl<'a> Object<'a> {
-    fn get(&self, key: &str) -> Option<FilePlace<'a>> {
-        self.entries.get(key).map(|json| FilePlace { path: below(&self.path, key), json })
+impl<'p> Object<'p> {
+    fn get(&self, key: &'p str) -> Option<FilePlace<'p>> {
+        self.entries.get(key).map(|json| self.place.key(key, json))
     }
 
-    fn need(&self, key: &str, expected: &'static str) -> Result<FilePlace<'a>, FileError> {
-        let missing = || FileError::Place { place: below(&self.path, key), problem: PlaceProblem::Missing(expected) };
-        self.get(key).ok_or_else(missing)
+    fn need(&self, key: &'p str, expected: &'static str) -> Result<FilePlace<'p>, FileError> {
+        self.get(key).ok_or_else(|| self.place.key(key, &Json::Null).wrong(PlaceProblem::Missing(expected)))
     }
 
-    fn text_or_none(&self, key: &str) -> Result<String, FileError> {
+    fn text_or_none(&self, key: &'p str) -> Result<String, FileError> {
         self.get(key).map_or(Ok(String::new()), |place| place.text())
     }
 }
 
-fn below(path: &str, key: &str) -> String {
-    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
-}
+impl FilePlace<'_> {
+    fn key<'s>(&'s self, key: &'s str, json: &'s Json) -> FilePlace<'s> {
+        FilePlace { above: Some((self, FileStep::Key(key))), json }
+    }
 
-impl<'a> FilePlace<'a> {
+    fn element<'s>(&'s self, at: usize, json: &'s Json) -> FilePlace<'s> {
+        FilePlace { above: Some((self, FileStep::Element(at))), json }
+    }
+
+    fn path(&self) -> String {
+        let Some((above, step)) = &self.above else { return String::new() };
+        let path = above.path();
+        match step {
+            FileStep::Key(key) if path.is_empty() => (*key).to_owned(),
+            FileStep::Key(key) => format!("{path}.{key}"),
+            FileStep::Element(at) => format!("{path}[{at}]"),
+        }
+    }
+
     fn wrong(&self, problem: PlaceProblem) -> FileError {
-        let place = if self.path.is_empty() { "the whole".into() } else { self.path.clone() };
-        FileError::Place { place, problem }
+        let path = self.path();
+        FileError::Place { place: if path.is_empty() { "the whole".into() } else { path }, problem }
     }
 
     fn expected(&self, expected: &'static str) -> FileError {
@@ -156,11 +199,11 @@ impl<'a> FilePlace<'a> {
         self.wrong(PlaceProblem::Expected { expected, got })
     }
 
-    fn object(&self, keys: &[&str]) -> Result<Object<'a>, FileError> {
+    fn object(&self, keys: &[&str]) -> Result<Object<'_>, FileError> {
         let entries = self.json.as_object().ok_or_else(|| self.expected("an object"))?;
         match entries.iter().find(|(key, _)| !keys.contains(&key.as_str())) {
-            Some((key, json)) => Err(FilePlace { path: below(&self.path, key), json }.wrong(PlaceProblem::Unknown)),
-            None => Ok(Object { path: self.path.clone(), entries }),
+            Some((key, json)) => Err(self.key(key, json).wrong(PlaceProblem::Unknown)),
+            None => Ok(Object { place: self, entries }),
         }
     }
 
@@ -173,13 +216,12 @@ impl<'a> FilePlace<'a> {
         number.ok_or_else(|| self.expected("a number from 0 to 65535"))
     }
 
-    fn list(&self) -> Result<Vec<FilePlace<'a>>, FileError> {
-        let all = self.json.as_array().ok_or_else(|| self.expected("a list"))?;
-        Ok(all.iter().enumerate().map(|(at, json)| FilePlace { path: format!("{}[{at}]", self.path), json }).collect())
+    fn list(&self) -> Result<&[Json], FileError> {
+        self.json.as_array().map(Vec::as_slice).ok_or_else(|| self.expected("a list"))
     }
 
-    fn each<T>(&self, read: impl Fn(&Self) -> Result<T, FileError>) -> Result<Vec<T>, FileError> {
-        self.list()?.iter().map(read).collect()
+    fn each<T>(&self, read: impl Fn(&FilePlace<'_>) -> Result<T, FileError>) -> Result<Vec<T>, FileError> {
+        self.list()?.iter().enumerate().map(|(at, json)| read(&self.element(at, json))).collect()
     }
 
     fn function(&self) -> Result<Function, FileError> {
@@ -222,12 +264,9 @@ impl<'a> FilePlace<'a> {
             Some((1, Some(only))) => only,
             _ => return Err(self.expected(TYPE)),
         };
-        let inner = FilePlace { path: below(&self.path, tag), json };
-        let pair = || match &inner.list()?[..] {
-            [first, second] => Ok((
-                FilePlace { path: first.path.clone(), ..*first },
-                FilePlace { path: second.path.clone(), ..*second },
-            )),
+        let inner = self.key(tag, json);
+        let pair = || match inner.list()? {
+            [first, second] => Ok((inner.element(0, first), inner.element(1, second))),
             _ => Err(inner.expected("a list of two")),
         };
         Ok(match tag.as_str() {
@@ -262,8 +301,8 @@ impl<'a> FilePlace<'a> {
         let object = self.object(&["name", "text", "members"])?;
         let members = object.need("members", MEMBERS)?;
         let entry = members.json.as_object().filter(|entries| entries.len() == 1).and_then(|it| it.iter().next());
-        let inner = entry.map(|(tag, json)| (tag.as_str(), FilePlace { path: below(&members.path, tag), json }));
-        let members = match inner {
+        let inner = entry.map(|(tag, json)| (tag.as_str(), members.key(tag, json)));
+        let inside = match inner {
             None if *members.json == "none" => Members::None,
             Some(("one", field)) => Members::One(Box::new(field.field()?)),
             Some(("tuple", fields)) => Members::Tuple(fields.each(|place| place.field())?),
@@ -271,7 +310,7 @@ impl<'a> FilePlace<'a> {
             _ => return Err(members.expected(MEMBERS)),
         };
         let text = object.text_or_none("text")?;
-        Ok(Named::new(object.need("name", "a name")?.text()?, members).said(text))
+        Ok(Named::new(object.need("name", "a name")?.text()?, inside).said(text))
     }
 }
 

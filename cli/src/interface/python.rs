@@ -6,7 +6,7 @@ use super::names::{Scope, camel, is_plain, last, snake};
 use super::refusal::{Refusal, RefusedFor};
 use super::standard;
 use super::texts::{in_docstring, one_line, python_literal, wrapped};
-use rohrpost::schema::{DataKind, Field, Value, decode};
+use rohrpost::schema::{DataKind, Field, Value};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
@@ -378,9 +378,8 @@ fn said(field: &Field, name: &str) -> String {
     };
     add("name", name);
     add("unit", &field.unit);
-    let bound = |bytes: &Option<Vec<u8>>| decode(&field.ty, bytes.as_ref()?).ok().as_ref().and_then(literal);
-    let (least, most) = (bound(&field.least), bound(&field.most));
-    let bounds = [("min", least), ("max", most)];
+    let (least, most) = field.bounds();
+    let bounds = [("min", least.as_ref().and_then(literal)), ("max", most.as_ref().and_then(literal))];
     add("text", &one_line(&field.text));
     let bounds = bounds.into_iter().filter_map(|(key, bound)| Some(format!("{key}={}", bound?)));
     words.extend(bounds);

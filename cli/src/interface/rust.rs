@@ -6,7 +6,7 @@ use super::names::{Scope, camel, is_plain, last, snake};
 use super::refusal::{Refusal, RefusedFor};
 use super::standard;
 use super::texts::{in_rust_doc, one_line, wrapped};
-use rohrpost::schema::{DataKind, Field, Type, Value, decode};
+use rohrpost::schema::{DataKind, Field, Type, Value};
 use std::collections::BTreeSet;
 
 /// Words that are names behind `r#` alone; those of `UNRAW` never are.
@@ -338,11 +338,10 @@ fn bounds(field: &Field) -> Option<(Option<String>, Option<String>)> {
     if !matches!(field.ty, U8 | U16 | U32 | U64 | U128 | I8 | I16 | I32 | I64 | I128 | F32 | F64) {
         return None;
     }
-    let read = |bytes: &Option<Vec<u8>>| match bytes {
-        Some(bytes) => decode(&field.ty, bytes).ok().map(Some),
-        None => Some(None),
-    };
-    let (least, most) = (read(&field.least)?, read(&field.most)?);
+    let (least, most) = field.bounds();
+    if (least.is_none(), most.is_none()) != (field.least.is_none(), field.most.is_none()) {
+        return None;
+    }
     let literal = |value: &Value| match value {
         Value::U(number) => Some(number.to_string()),
         Value::I(number) => Some(number.to_string()),

@@ -4,7 +4,7 @@ use super::super::table::table;
 use super::session::{Session, find, no_parameters};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::parameter::{Parameter, value_text};
-use rohrpost::schema::{Field, decode};
+use rohrpost::schema::Field;
 use std::process::ExitCode;
 
 /// Parameters of one module, or of all.
@@ -72,11 +72,11 @@ fn row(parameter: &Parameter) -> Result<[String; 5], Failure> {
 }
 
 fn object(module: &str, parameter: &Parameter) -> Result<serde_json::Value, Failure> {
-    let Field { name, unit, text, ty, least, most } = &parameter.field;
-    let bound = |bytes: &Option<Vec<u8>>| bytes.as_ref().map(|bytes| decode(ty, bytes)).transpose();
+    let Field { name, unit, text, ty, .. } = &parameter.field;
+    let (least, most) = parameter.field.bounds();
     Ok(serde_json::json!({
         "module": module, "parameter": name, "value": parameter.value()?, "unit": unit,
         "type": rohrpost::schema::describe_type(ty),
-        "min": bound(least)?, "max": bound(most)?, "text": text,
+        "min": least, "max": most, "text": text,
     }))
 }

@@ -1,5 +1,6 @@
 //! `record recover`, `record cut` and `record merge`: new files from old ones.
 
+use super::info::more_damages;
 use super::part::PartArguments;
 use super::progress::ProgressLine;
 use crate::terminal::{Failure, say};
@@ -82,9 +83,8 @@ fn recovered_text(file: &Path, told: &Recovered) -> String {
     for (at, damage) in &told.damages {
         text.push_str(&format!("\nat byte {at} of {}: {damage}", told.bytes_before));
     }
-    let more = told.damage_count - told.damages.len() as u64;
-    if more > 0 {
-        text.push_str(&format!("\nand {more} more"));
+    if let Some(more) = more_damages(told.damage_count, &told.damages) {
+        text.push_str(&format!("\n{more}"));
     }
     text
 }

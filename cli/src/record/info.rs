@@ -7,7 +7,7 @@ use crate::units::size;
 use rohrpost::output::plain;
 use rohrpost::schema::describe_type;
 use rohrpost_recording::format::PROFILE;
-use rohrpost_recording::{ChannelInfo, Info};
+use rohrpost_recording::{ChannelInfo, Damage, Info};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -87,6 +87,7 @@ fn text(info: &Info) -> String {
         lines.push(format!("{name}: {}", texts.join(", ")));
     }
     lines.extend(info.damages.iter().map(|(at, damage)| format!("at byte {at}: {damage}")));
+    lines.extend(more_damages(info.damage_count, &info.damages));
     let rows = info.channels.iter().map(|channel| {
         let rate = rate(channel).map_or(String::new(), |rate| format!("{rate:.1}"));
         [channel.topic.clone(), channel.messages.to_string(), rate, channel.lost.to_string(), type_text(channel)]
@@ -94,6 +95,12 @@ fn text(info: &Info) -> String {
     // Texts of others would make lines of their own.
     let lines: Vec<_> = lines.iter().map(|line| plain::line(line)).collect();
     format!("{}\n\n{}", lines.join("\n"), table(["topic", ">messages", ">per s", ">lost", "type"], rows))
+}
+
+/// What is said behind the damages that are listed, if there are more.
+pub(super) fn more_damages(count: u64, listed: &[(u64, Damage)]) -> Option<String> {
+    let more = count - listed.len() as u64;
+    (more > 0).then(|| format!("and {more} more, {count} in all"))
 }
 
 /// All messages; and how many are drawn of others, if they stand beside those.
@@ -132,7 +139,7 @@ fn as_json(info: &Info) -> Value {
     let channels = info.channels.iter().map(|channel| {
         json!({
             "topic": channel.topic, "name": channel.name, "item": channel.item, "type_name": channel.type_name,
-            "type": channel.ty.as_ref().map(describe_type), "message_encoding": channel.message_encoding,
+            "type": channel.ty.as_deref().map(describe_type), "message_encoding": channel.message_encoding,
             "schema_encoding": channel.schema_encoding, "drawn_of": channel.drawn_of, "reduced": channel.is_reduced,
             "messages": channel.messages, "repeated": channel.repeated, "lost": channel.lost,
             "first_ns": channel.first_ns, "last_ns": channel.last_ns,
@@ -156,5 +163,6 @@ fn as_json(info: &Info) -> Value {
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
         "marks": marks.collect::<Vec<_>>(), "described": described.collect::<Vec<_>>(),
         "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),
+        "damage_count": info.damage_count,
     })
 }

@@ -129,13 +129,14 @@ mod tests {
     use super::*;
     use rohrpost::schema::{Field, Members, Named, Type};
     use std::collections::BTreeMap;
+    use std::sync::Arc;
 
     fn channel(ty: Option<Type>, encoding: &str) -> RecordedChannel {
         RecordedChannel {
             topic: "laser.0/scan".into(),
             name: "laser.0".into(),
             item: "scan".into(),
-            ty,
+            ty: ty.map(Arc::new),
             message_encoding: encoding.into(),
             schema_encoding: String::new(),
             texts: BTreeMap::new(),

@@ -7,6 +7,8 @@
 //! ```
 
 mod answers;
+#[cfg(test)]
+mod asking_tests;
 mod channels;
 mod configuration;
 mod course;
@@ -22,6 +24,7 @@ use crate::check;
 use crate::demo::{Folder, drawing, drawn, is_built_in, write_map};
 use crate::exact::{self, ExactArguments, JournalAnswers};
 use crate::launch::end;
+use crate::quota::check_shared;
 use crate::record::PartArguments;
 use crate::speech::Speech;
 use crate::terminal::{Failure, complain, say};
@@ -234,6 +237,11 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         |errors| format!("the recorded configuration does not fit a replay with these modules:\n{}", told(&errors));
     let mut installation = check::load(&path).map_err(named)?;
     installation.shown = CONFIG.into();
+    // One that the user names is the user's own word, and so are the streams that are named with --into.
+    if arguments.config.is_none() && !recorded.are_others {
+        let meant = |error| format!("{error}; if that is meant, name a configuration of your own: --config FILE");
+        check_shared(installation.memory_on(NODE)).map_err(meant)?;
+    }
     Ok(MadeReplay { installation, player, played })
 }
 

@@ -34,6 +34,8 @@ use std::time::{Duration, Instant};
 /// Values played at once at most, and the time after which no further one is begun: commands are heard in between.
 const AT_ONCE_MAX: usize = 64;
 const AT_ONCE_TIME: Duration = Duration::from_millis(2);
+/// So many places that cannot be read are told one by one; all are counted.
+const DAMAGES_TOLD_MAX: u64 = 10;
 /// Where it is, is published so often.
 const TOLD: Duration = Duration::from_millis(200);
 /// The timer's shortest time; none would switch it off.
@@ -172,7 +174,9 @@ impl RecordingPlayer {
                 Ok(moved) => moved,
                 Err(error) => {
                     self.damages += 1;
-                    tracing::warn!("{error}; goes on behind that");
+                    if self.damages <= DAMAGES_TOLD_MAX {
+                        tracing::warn!("{error}; goes on behind that");
+                    }
                     continue;
                 }
             };

@@ -92,10 +92,10 @@ fn is_within(field: &Field, value: &Value) -> bool {
     {
         return false;
     }
-    let bound = |bytes: &Option<Vec<u8>>| decode(&field.ty, bytes.as_ref()?).ok();
+    let (lower, upper) = field.bounds();
     let is_least = |least: &Value| matches!(compare(value, least), Some(Ordering::Equal | Ordering::Greater));
     let is_most = |most: &Value| matches!(compare(value, most), Some(Ordering::Equal | Ordering::Less));
-    bound(&field.least).as_ref().is_none_or(is_least) && bound(&field.most).as_ref().is_none_or(is_most)
+    lower.as_ref().is_none_or(is_least) && upper.as_ref().is_none_or(is_most)
 }
 
 fn compare(value: &Value, bound: &Value) -> Option<Ordering> {

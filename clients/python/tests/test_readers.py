@@ -18,12 +18,13 @@ from typing import Any
 import rohrpost as rp
 from rohrpost.annotations import type_of
 from rohrpost.schema import WalkError, encode, to_json, type_from_bytes
+from rohrpost.schema.budget import EMPTY_MAX
 from rohrpost.schema.decode import Decoder, decode
 from rohrpost.schema.encode import _Encoder
 from rohrpost.schema.readers import READERS, reader_of
 from rohrpost.schema.scalars import Unread
 from rohrpost.schema.tree import (
-    BOOL, BYTES, CHAR, EMPTY_MAX, F32, F64, TEXT, U8, U32, UNIT, Array, Enum, Field, List, Map, Named, Option, Plain,
+    BOOL, BYTES, CHAR, F32, F64, TEXT, U8, U32, UNIT, Array, Enum, Field, List, Map, Named, Option, Plain,
     Struct, Tuple, Type, Variant, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
 from rohrpost.schema.writers import writer_of
@@ -225,11 +226,23 @@ class Readers(unittest.TestCase):
             self.assertEqual(len(decode(BYTES, many + bytes(0x3FFFFFF))), 0x3FFFFFF)
             self.assertEqual(len(decode(List(F32), b"\xc0\x84\x3d" + bytes(4_000_000))), 1_000_000)
 
+    def test_python_and_rust_refuse_the_same_messages(self) -> None:
+        for case in json.loads((CASES.parent / "budget.json").read_text()):
+            type = type_from_bytes(bytes.fromhex(case["type"]))
+            data = bytes.fromhex(case["head"]) + bytes.fromhex(case["each"]) * case["times"]
+            for _ in range(3):
+                with self.subTest(case["what"]):
+                    try:
+                        decode(type, data)
+                        said = None
+                    except WalkError as error:
+                        said = str(error)
+                    self.assertEqual(said, case["error"])
+
     def test_both_count_values_alike(self) -> None:
         chance, refused, read = random.Random(5), 0, 0
         with contextlib.ExitStack() as stack:
-            for module in ("decode", "readers"):
-                # By its module: the package has a function of this name.
+            for module in ("budget", "readers"):
                 its = sys.modules[f"rohrpost.schema.{module}"]
                 stack.enter_context(unittest.mock.patch.object(its, "VALUES_MAX", 6))
             # Copies have no reader of before, which has another limit.
@@ -296,7 +309,7 @@ class Readers(unittest.TestCase):
         assert read is not None
         with self.assertRaises(Unread):
             read(bytes(8), 0, None)
-        with self.assertRaisesRegex(WalkError, r"^\[1\]: 8 bytes missing"):
+        with self.assertRaisesRegex(WalkError, "^4294967287 bytes missing"):
             decode(Array((1 << 32) - 1, F64), bytes(8))
 
     def test_a_reader_is_made_when_a_type_is_read_again(self) -> None:

@@ -12,8 +12,9 @@ import rohrpost as rp
 from rohrpost import schema
 from rohrpost.annotations import type_of
 from rohrpost.schema import SchemaError, WalkError, decode, encode, type_from_bytes
+from rohrpost.schema.budget import EMPTY_MAX
 from rohrpost.schema.tree import (
-    EMPTY_MAX, F32, F64, TEXT, U8, U16, U32, U64, UNIT, Array, Enum, Field, List, Map, Named, Option, Struct, Tuple,
+    F32, F64, TEXT, U8, U16, U32, U64, UNIT, Array, Enum, Field, List, Map, Named, Option, Struct, Tuple,
     Type, Variant,
 )  # fmt: skip
 

@@ -170,8 +170,7 @@ impl Current {
         texts.extend(further.map(|(key, text)| (key.to_owned(), text)));
         let id = self.file.channel(schema, topic, MESSAGE_ENCODING, &texts)?;
         if let Some(drawing) = self.drawing.as_mut().filter(|drawing| !drawing.knows(id)) {
-            let encoding = SCHEMA_ENCODING.into();
-            let schema = Arc::new(SchemaText { name: schema_name.clone(), encoding, data: data.clone() });
+            let schema = Arc::new(SchemaText::new(schema_name.clone(), SCHEMA_ENCODING.into(), data.clone()));
             drawing
                 .add(id, Definition { topic: topic.clone(), message_encoding: MESSAGE_ENCODING.into(), texts, schema });
         }

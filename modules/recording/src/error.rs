@@ -1,5 +1,6 @@
 //! What goes wrong on the disk and in files.
 
+use crate::format::DESCRIBED_BYTES_MAX;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -157,6 +158,26 @@ pub enum ReadError {
         /// What is wrong.
         what: Damage,
     },
+    /// It may be whole, and is more than is read here.
+    #[error("{path}: {limit}")]
+    TooMuch {
+        /// The file.
+        path: Shown,
+        /// Of what.
+        limit: FileLimit,
+    },
+}
+
+/// What of a file is more than is read here. The file need not be damaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum FileLimit {
+    /// Descriptions of types, channels and modules.
+    #[error(
+        "what it describes (types, channels, modules) takes more than {} MiB of memory, which is the limit; \
+         record fewer topics in a file",
+        DESCRIBED_BYTES_MAX >> 20
+    )]
+    Described,
 }
 
 /// How a part of a file is damaged.

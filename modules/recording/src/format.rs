@@ -20,6 +20,8 @@ pub const CHUNK_BYTES_MAX: usize = 1 << 20;
 pub const MESSAGE_BYTES_MAX: usize = 16 << 20;
 /// A record, and a chunk before compression. In files, longer ones are damage.
 pub(crate) const RECORD_BYTES_MAX: usize = MESSAGE_BYTES_MAX + (4 << 20);
+/// Memory for the descriptions of types, channels and modules in one file. Those of a robot take some megabytes.
+pub(crate) const DESCRIBED_BYTES_MAX: usize = 256 << 20;
 /// What a message takes besides its data: type, length, channel, sequence and two times.
 pub(crate) const MESSAGE_OVERHEAD_BYTES: usize = 9 + 22;
 

@@ -1,5 +1,6 @@
 //! What is in a file.
 
+use crate::damages::Damages;
 use crate::described::DescribedModule;
 use crate::error::{Damage, ReadError};
 use crate::format::{self, key, metadata};
@@ -12,6 +13,7 @@ use mcap::records::Metadata;
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What is in a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,8 +30,10 @@ pub struct Info {
     pub library: String,
     /// Of which kind it is: `rohrpost` in our files, `ros2` in those of rosbag2.
     pub profile: String,
-    /// Where it is not readable: looked for in files that were not closed.
+    /// Where it is not readable: looked for in files that were not closed. The first hundred.
     pub damages: Vec<(u64, Damage)>,
+    /// All of them.
+    pub damage_count: u64,
     /// Chunks.
     pub chunks: u64,
     /// Messages in all channels, without those that are repeated.
@@ -70,7 +74,7 @@ pub struct ChannelInfo {
     /// The name of its type.
     pub type_name: String,
     /// Its type, if it is one of ours.
-    pub ty: Option<Type>,
+    pub ty: Option<Arc<Type>>,
     /// How its type is described: `rohrpost-schema` in our files; empty: not at all.
     pub schema_encoding: String,
     /// `postcard` in our files.
@@ -158,7 +162,7 @@ fn from_index(mut frames: Frames, index: &Index) -> Result<Info, ReadError> {
         about.push(contents.metadata_at(at.offset)?);
     }
     contents.read_header()?;
-    let mut info = build(&contents, &index.definitions, &tallies, about);
+    let mut info = build(&contents, &index.definitions, &tallies, about)?;
     info.is_closed = true;
     info.chunks = index.chunks.len() as u64;
     if info.messages > 0 {
@@ -171,7 +175,7 @@ fn from_index(mut frames: Frames, index: &Index) -> Result<Info, ReadError> {
 fn from_all(path: &Path) -> Result<Info, ReadError> {
     let mut contents = Contents::open(path)?;
     let mut tallies: BTreeMap<u16, Tally> = BTreeMap::new();
-    let (mut about, mut damages) = (Vec::new(), Vec::new());
+    let (mut about, mut damages) = (Vec::new(), Damages::default());
     while let Some(item) = contents.next()? {
         match item {
             Item::Message(found) => {
@@ -180,17 +184,22 @@ fn from_all(path: &Path) -> Result<Info, ReadError> {
                 tally.widen(Some((found.header.log_time, found.header.log_time)));
             }
             Item::Metadata(metadata) => about.push(metadata),
-            Item::Damaged(at, damage) => damages.push((at, damage)),
+            Item::Damaged(at, damage) => damages.note(at, damage),
         }
     }
-    let mut info = build(&contents, contents.definitions(), &tallies, about);
+    let mut info = build(&contents, contents.definitions(), &tallies, about)?;
     info.is_closed = contents.ending() == Some(Ending::Closed);
     info.chunks = contents.chunks();
-    info.damages = damages;
+    (info.damages, info.damage_count) = (damages.listed, damages.count);
     Ok(info)
 }
 
-fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16, Tally>, about: Vec<Metadata>) -> Info {
+fn build(
+    contents: &Contents,
+    definitions: &Definitions,
+    tallies: &BTreeMap<u16, Tally>,
+    about: Vec<Metadata>,
+) -> Result<Info, ReadError> {
     let mut info = Info {
         path: contents.path().to_owned(),
         bytes: contents.file_bytes(),
@@ -199,6 +208,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         library: contents.header().map(|header| header.library.clone()).unwrap_or_default(),
         profile: contents.header().map(|header| header.profile.clone()).unwrap_or_default(),
         damages: Vec::new(),
+        damage_count: 0,
         chunks: 0,
         messages: 0,
         repeated: 0,
@@ -213,7 +223,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         described: Vec::new(),
         others: Vec::new(),
     };
-    let mut lost = BTreeMap::new();
+    let (mut lost, mut memory) = (BTreeMap::new(), definitions.memory());
     for its in about {
         let is_heeded = contents.heeds(&its);
         let Metadata { name, metadata: mut texts } = its;
@@ -228,7 +238,10 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
             metadata::MARK if let Some(mark) = Mark::of_texts(&texts) => info.marks.push(mark),
             metadata::DESCRIPTION => match DescribedModule::read(&texts) {
                 Some(module) if info.described.contains(&module) => {}
-                Some(module) => info.described.push(module),
+                Some(module) => {
+                    memory.add(0, module.description.memory_bytes()).map_err(|limit| contents.too_much(limit))?;
+                    info.described.push(module);
+                }
                 None => info.others.push((name, texts)),
             },
             _ => info.others.push((name, texts)),
@@ -270,7 +283,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         EpochInfo { epoch, first_ns, last_ns, messages }
     };
     info.epochs = epochs.into_iter().map(epoch_info).collect();
-    info
+    Ok(info)
 }
 
 /// Files may claim any count.
@@ -284,7 +297,7 @@ fn describe(info: &mut ChannelInfo, channel: &Definition) {
     info.topic.clone_from(&channel.topic);
     (info.name, info.item) = (text(key::NAME), text(key::ITEM));
     info.type_name.clone_from(&channel.schema.name);
-    info.ty = channel.schema.ty();
+    info.ty = channel.schema.ty().cloned();
     info.schema_encoding.clone_from(&channel.schema.encoding);
     info.message_encoding.clone_from(&channel.message_encoding);
     info.drawn_of = channel.texts.get(key::DRAWN).cloned();

@@ -24,7 +24,7 @@ pub struct RecordedChannel {
     /// What it published: `scan`.
     pub item: String,
     /// Its type, if it is one of ours.
-    pub ty: Option<Type>,
+    pub ty: Option<Arc<Type>>,
     /// `postcard` in our files.
     pub message_encoding: String,
     /// How its type is described: `rohrpost-schema` in our files; empty: not at all.
@@ -216,7 +216,7 @@ fn recorded(channel: &Definition) -> RecordedChannel {
         topic: channel.topic.clone(),
         name: text(key::NAME),
         item: text(key::ITEM),
-        ty: channel.schema.ty(),
+        ty: channel.schema.ty().cloned(),
         message_encoding: channel.message_encoding.clone(),
         schema_encoding: channel.schema.encoding.clone(),
         texts: channel.texts.clone(),

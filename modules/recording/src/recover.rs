@@ -1,5 +1,6 @@
 //! A whole file from one that was not closed, or is damaged.
 
+use crate::damages::Damages;
 use crate::disk::is_being_written;
 use crate::error::{Damage, ReadError, RewriteError, Shown};
 use crate::format::metadata;
@@ -8,9 +9,6 @@ use crate::rewrite::{Progress, Rewriter};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-
-/// So many damages are listed; all are counted.
-const DAMAGES_LISTED_MAX: usize = 100;
 
 /// What was recovered.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,8 +66,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
     }
     let mut contents = Contents::open(path)?;
     let mut new = Rewriter::create(to)?;
-    let mut damages = Vec::new();
-    let (mut damage_count, mut unchecked) = (0, 0);
+    let (mut damages, mut unchecked) = (Damages::default(), 0);
     while let Some(item) = contents.next()? {
         progress(contents.at(), contents.file_bytes());
         match item {
@@ -81,12 +78,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
             Item::Metadata(metadata) => {
                 new.metadata(&metadata.name, metadata.metadata).map_err(RewriteError::from)?;
             }
-            Item::Damaged(at, damage) => {
-                damage_count += 1;
-                if damages.len() < DAMAGES_LISTED_MAX {
-                    damages.push((at, damage));
-                }
-            }
+            Item::Damaged(at, damage) => damages.note(at, damage),
         }
     }
     for (id, channel) in contents.definitions().channels() {
@@ -100,7 +92,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
         ("bytes", bytes_before.to_string()),
         ("bytes-read", bytes_read.to_string()),
         ("was-closed", was_closed.to_string()),
-        ("damages", damage_count.to_string()),
+        ("damages", damages.count.to_string()),
         ("unchecked", unchecked.to_string()),
     ];
     let about: BTreeMap<String, String> = about.into_iter().map(|(key, text)| (key.to_owned(), text)).collect();
@@ -115,8 +107,8 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
         bytes_before,
         bytes_read,
         was_closed,
-        damages,
-        damage_count,
+        damages: damages.listed,
+        damage_count: damages.count,
     })
 }
 

@@ -64,7 +64,7 @@ pub(crate) fn parse_word(ty: &Type, text: &str) -> Result<Value, WalkProblem> {
 fn parse_variant(ty: &Type, variants: &[Named], text: &str) -> Result<Value, WalkProblem> {
     let (_, variant) = find_variant(variants, text).ok_or_else(|| unexpected(expectation(ty), text))?;
     match variant.members {
-        Members::None => Ok(Value::unit_variant(&variant.name)),
+        Members::None => Ok(Value::unit_variant(&*variant.name)),
         _ => Err(unexpected(format!("JSON {}", expectation(ty)), text)),
     }
 }

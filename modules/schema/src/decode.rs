@@ -1,12 +1,14 @@
 //! From bytes to values.
 
 use crate::{
-    DEPTH_MAX, EMPTY_MAX, Field, Members, Named, Type, Value, WalkError, WalkProblem,
+    DEPTH_MAX, Field, Label, Members, Named, Type, Value, WalkError, WalkProblem,
+    budget::Budget,
     bytes::read_varint,
     scalar::{Integer, shortest},
     show::word,
     words::{is_byte, is_empty, is_nullable, is_word, unwrapped},
 };
+use std::collections::HashMap;
 
 /// The value that `bytes`, all of them, hold according to their description.
 ///
@@ -23,9 +25,10 @@ use crate::{
 ///
 /// # Errors
 ///
-/// Bytes that are cut, that go on, or that another type wrote, with the path to the place where it showed.
+/// Bytes that are cut, that go on, that another type wrote, or that would become more values than a message of their
+/// length may have ([`VALUES_MAX`](crate::VALUES_MAX)), with the path to the place where it showed.
 pub fn decode(ty: &Type, bytes: &[u8]) -> Result<Value, WalkError> {
-    let mut decoder = Decoder { bytes, depth: 0, empty_left: EMPTY_MAX };
+    let mut decoder = Decoder { bytes, depth: 0, budget: Budget::of_message(bytes.len()), asked: Asked::default() };
     let value = decoder.value(ty)?;
     match decoder.bytes.len() {
         0 => Ok(value),
@@ -37,8 +40,37 @@ struct Decoder<'a> {
     /// What is not read yet.
     bytes: &'a [u8],
     depth: usize,
-    /// How many more values may take no bytes.
-    empty_left: usize,
+    budget: Budget,
+    asked: Asked,
+}
+
+/// What was asked of the description, by where that is: once a message, not once a value. The description does not
+/// move as long as it is borrowed.
+#[derive(Default)]
+struct Asked {
+    labels: HashMap<*const u8, Label>,
+    empty: HashMap<*const Type, bool>,
+    words: HashMap<*const Type, bool>,
+}
+
+impl Asked {
+    fn label(&mut self, name: &str) -> Label {
+        self.labels.entry(name.as_ptr()).or_insert_with(|| name.into()).clone()
+    }
+
+    fn is_empty(&mut self, ty: &Type) -> bool {
+        match ty {
+            Type::Array(..) | Type::Tuple(_) | Type::Struct(_) => *self.empty.entry(ty).or_insert_with(|| is_empty(ty)),
+            ty => is_empty(ty),
+        }
+    }
+
+    fn is_word(&mut self, ty: &Type) -> bool {
+        match unwrapped(ty) {
+            choice @ Type::Enum { .. } => *self.words.entry(choice).or_insert_with(|| is_word(choice)),
+            ty => is_word(ty),
+        }
+    }
 }
 
 impl<'a> Decoder<'a> {
@@ -46,12 +78,13 @@ impl<'a> Decoder<'a> {
         if self.depth >= DEPTH_MAX {
             return Err(WalkProblem::TooDeep.into());
         }
+        self.budget.value()?;
         let before = self.bytes.len();
         self.depth += 1;
         let value = self.unbounded(unwrapped(ty))?;
         self.depth -= 1;
         if self.bytes.len() == before {
-            self.empty_left = self.empty_left.checked_sub(1).ok_or(WalkProblem::TooManyEmpty)?;
+            self.budget.empty()?;
         }
         Ok(value)
     }
@@ -71,20 +104,38 @@ impl<'a> Decoder<'a> {
             Type::Unit => Ok(Value::Null),
             Type::Option(inner) => match self.flag()? {
                 false => Ok(Value::Null),
-                true if is_nullable(inner) => Ok(Value::Variant("Some".into(), Box::new(self.value(inner)?))),
+                true if is_nullable(inner) => {
+                    Ok(Value::Variant(self.asked.label("Some"), Box::new(self.value(inner)?)))
+                }
                 true => self.value(inner),
             },
             Type::List(element) => {
-                let length = self.length(is_empty(element))?;
-                self.list((0..length).map(|_| element.as_ref()))
+                let is_empty = self.asked.is_empty(element);
+                let length = self.length(is_empty)?;
+                self.many(length, element, is_empty)
             }
-            Type::Array(length, element) => self.list((0..*length).map(|_| element.as_ref())),
+            Type::Array(length, element) => {
+                let is_empty = self.asked.is_empty(element);
+                let length = self.fixed_length(*length, is_empty)?;
+                self.many(length, element, is_empty)
+            }
             Type::Tuple(elements) => self.list(elements.iter()),
             Type::Map(key, value) => self.map(key, value),
             Type::Struct(named) => self.members(&named.members),
             Type::Enum { variants, .. } => self.variant(variants),
             _ => unreachable!("integers are read above"),
         }
+    }
+
+    /// So many elements. What is too much is refused before it is made.
+    fn many(&mut self, length: usize, element: &Type, is_empty: bool) -> Result<Value, WalkError> {
+        if matches!(unwrapped(element), Type::F32 | Type::F64) {
+            self.budget.credit(length);
+        }
+        if !is_empty {
+            self.budget.has_room(length)?;
+        }
+        self.list((0..length).map(|_| element))
     }
 
     fn list<'t>(&mut self, types: impl Iterator<Item = &'t Type>) -> Result<Value, WalkError> {
@@ -102,20 +153,25 @@ impl<'a> Decoder<'a> {
     }
 
     fn fields(&mut self, fields: &[Field]) -> Result<Value, WalkError> {
-        let entry = |field: &Field| match self.value(&field.ty) {
-            Ok(value) => Ok((field.name.clone(), value)),
-            Err(error) => Err(error.within(&field.name)),
+        let entry = |field: &Field| -> Result<_, WalkError> {
+            let value = self.field(field).map_err(|error| error.within(&field.name))?;
+            Ok((self.asked.label(&field.name), value))
         };
-        Ok(Value::Map(fields.iter().map(entry).collect::<Result<_, WalkError>>()?))
+        Ok(Value::Map(fields.iter().map(entry).collect::<Result<_, _>>()?))
+    }
+
+    fn field(&mut self, field: &Field) -> Result<Value, WalkError> {
+        self.budget.name(&field.name)?;
+        self.value(&field.ty)
     }
 
     fn map(&mut self, key: &Type, val: &Type) -> Result<Value, WalkError> {
-        let length = self.length(is_empty(key) && is_empty(val))?;
-        if !is_word(key) {
+        let is_empty = self.asked.is_empty(key) && self.asked.is_empty(val);
+        let length = self.length(is_empty)?;
+        if !self.asked.is_word(key) {
             let mut pairs = Vec::new();
             for index in 0..length {
-                let pair = self.list([key, val].into_iter()).map_err(|error| error.within_element(index))?;
-                pairs.push(pair);
+                pairs.push(self.pair(key, val).map_err(|error| error.within_element(index))?);
             }
             return Ok(Value::List(pairs));
         }
@@ -128,12 +184,22 @@ impl<'a> Decoder<'a> {
         Ok(Value::Map(entries))
     }
 
+    fn pair(&mut self, key: &Type, val: &Type) -> Result<Value, WalkError> {
+        self.budget.value()?;
+        self.list([key, val].into_iter())
+    }
+
     fn variant(&mut self, variants: &[Named]) -> Result<Value, WalkError> {
         let index = self.varint(32)? as u64;
         let known = usize::try_from(index).ok().and_then(|index| variants.get(index));
         let variant = known.ok_or(WalkProblem::NoSuchVariant { index, known: variants.len() })?;
-        let payload = self.members(&variant.members).map_err(|error| error.within(&variant.name))?;
-        Ok(Value::Variant(variant.name.clone(), Box::new(payload)))
+        let payload = self.payload(variant).map_err(|error| error.within(&variant.name))?;
+        Ok(Value::Variant(self.asked.label(&variant.name), Box::new(payload)))
+    }
+
+    fn payload(&mut self, variant: &Named) -> Result<Value, WalkError> {
+        self.budget.name(&variant.name)?;
+        self.members(&variant.members)
     }
 
     /// The length of a list, refused if each element takes a byte and there are fewer bytes.
@@ -141,10 +207,18 @@ impl<'a> Decoder<'a> {
         let claimed = self.varint(64)? as u64;
         let left = self.bytes.len();
         match usize::try_from(claimed) {
-            Ok(length) if elements_empty && length <= self.empty_left => Ok(length),
-            _ if elements_empty => Err(WalkProblem::TooManyEmpty),
+            _ if elements_empty => self.budget.room_for_empty(claimed),
             Ok(length) if length <= left => Ok(length),
             _ => Err(WalkProblem::LengthClaimed { claimed, left }),
+        }
+    }
+
+    /// The length of an array, refused likewise: its type may say any.
+    fn fixed_length(&self, length: u32, elements_empty: bool) -> Result<usize, WalkProblem> {
+        match (length as usize).checked_sub(self.bytes.len()) {
+            _ if elements_empty => self.budget.room_for_empty(length.into()),
+            None | Some(0) => Ok(length as usize),
+            Some(bytes) => Err(WalkProblem::BytesMissing { bytes }),
         }
     }
 

@@ -126,6 +126,21 @@ impl Description {
         })
     }
 
+    /// Memory that it needs with all that is in it, bytes. Room that vectors have besides is not in it.
+    pub fn memory_bytes(&self) -> usize {
+        let functions = self.functions.iter().map(|function| {
+            let arguments = function.arguments.iter().map(Field::memory_bytes).sum::<usize>();
+            size_of::<Function>()
+                + function.name.len()
+                + function.text.len()
+                + arguments
+                + function.result.memory_bytes()
+        });
+        let data = self.data.iter().map(|item| size_of::<DataItem>() + item.field.memory_bytes());
+        let texts = self.name.len() + self.class.len() + self.text.len();
+        size_of::<Self>() + texts + functions.sum::<usize>() + data.sum::<usize>()
+    }
+
     /// A function by its name.
     pub fn function(&self, name: &str) -> Option<&Function> {
         self.functions.iter().find(|function| function.name == name)

@@ -1,7 +1,7 @@
 //! From values to bytes.
 
 use crate::{
-    DEPTH_MAX, Field, Members, Named, Type, Value, WalkError, WalkProblem,
+    DEPTH_MAX, Field, Label, Members, Named, Type, Value, WalkError, WalkProblem,
     argument::parse_word,
     bytes::write_varint,
     scalar::{Integer, float, shortened},
@@ -131,7 +131,7 @@ impl Encoder {
         }
     }
 
-    fn map(&mut self, key: &Type, val: &Type, entries: &[(String, Value)]) -> Result<(), WalkError> {
+    fn map(&mut self, key: &Type, val: &Type, entries: &[(Label, Value)]) -> Result<(), WalkError> {
         self.varint(entries.len() as u128);
         for (name, value) in entries {
             let within = |error: WalkError| error.within(name);
@@ -153,12 +153,12 @@ impl Encoder {
         Ok(())
     }
 
-    fn fields(&mut self, fields: &[Field], entries: &[(String, Value)]) -> Result<(), WalkError> {
+    fn fields(&mut self, fields: &[Field], entries: &[(Label, Value)]) -> Result<(), WalkError> {
         let mut used = 0;
         for (index, field) in fields.iter().enumerate() {
             // Mostly they stand in order; and by their place, fields that share a name are told apart.
-            let in_place = entries.get(index).filter(|(name, _)| *name == field.name);
-            let entry = in_place.or_else(|| entries.iter().find(|(name, _)| *name == field.name));
+            let in_place = entries.get(index).filter(|(name, _)| *name == *field.name);
+            let entry = in_place.or_else(|| entries.iter().find(|(name, _)| *name == *field.name));
             used += usize::from(entry.is_some());
             let encoded = match entry {
                 Some((_, value)) => self.value(&field.ty, value),
@@ -228,8 +228,8 @@ fn marked_some<'v>(ty: &Type, value: &'v Value) -> Result<&'v Value, WalkProblem
 }
 
 /// All fields found their entries, but there are more entries: either unknown ones, or one of them twice.
-fn surplus(fields: &[Field], entries: &[(String, Value)]) -> WalkError {
-    let unknown = entries.iter().find(|(name, _)| fields.iter().all(|field| field.name != *name));
+fn surplus(fields: &[Field], entries: &[(Label, Value)]) -> WalkError {
+    let unknown = entries.iter().find(|(name, _)| fields.iter().all(|field| *name != *field.name));
     if let Some((name, _)) = unknown {
         let known: Vec<_> = fields.iter().map(|field| field.name.escape_debug().to_string()).collect();
         let known = if known.is_empty() { "none".into() } else { known.join(", ") };

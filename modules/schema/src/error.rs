@@ -39,6 +39,12 @@ pub enum WalkProblem {
     /// Too many elements that take no bytes.
     #[error("more than {} values that take no bytes", crate::EMPTY_MAX)]
     TooManyEmpty,
+    /// More values than a message of this length may have: memory and time are bounded by what was sent.
+    #[error("more than {most} values in one; send many numbers as bytes, or as lists of f32 or f64")]
+    TooManyValues {
+        /// So many it may have.
+        most: usize,
+    },
     /// The description or the value nests too deep.
     #[error("nested more than {} deep", crate::DEPTH_MAX)]
     TooDeep,

@@ -12,7 +12,8 @@
 //! ```
 //!
 //! Both descriptions and bytes come from other processes, so nothing here trusts them: no input panics, nesting ends at
-//! [`DEPTH_MAX`], and a claimed length is compared with the bytes that are left before anything is allocated for it.
+//! [`DEPTH_MAX`], a claimed length is compared with the bytes that are left before anything is allocated for it, and
+//! all values of a message are counted (`budget.rs`).
 //!
 //! What encodes and decodes again is the same, with one exception: which of the many NaNs an `f32` was may change.
 //!
@@ -25,6 +26,8 @@
 extern crate self as rohrpost_schema;
 
 mod argument;
+mod bounds;
+mod budget;
 mod byte_field;
 mod bytes;
 mod decode;
@@ -32,6 +35,7 @@ mod description;
 mod encode;
 mod error;
 mod json;
+mod label;
 mod quantities;
 mod scalar;
 mod serial;
@@ -50,6 +54,7 @@ pub use decode::decode;
 pub use description::{DataItem, DataKind, Description, Function};
 pub use encode::encode;
 pub use error::{WalkError, WalkProblem};
+pub use label::Label;
 pub use quantities::{counters, quantities, quantity_fields};
 pub use rohrpost_macros::Schema;
 pub use show::{LIST_SHOWN, Shown, numbers};
@@ -65,6 +70,17 @@ pub const DEPTH_MAX: usize = 128;
 /// Values that take no bytes (units, structs without fields) in one message: without a bound, three bytes could claim
 /// a list of millions of them.
 pub const EMPTY_MAX: usize = 65_536;
+
+/// Values in one message, but for the contents of bytes and texts, and for numbers in a list of `f32` or `f64`: some
+/// 100 MB of memory here, and as much in Python.
+pub const VALUES_MAX: usize = 1_000_000;
+
+/// Values for each byte of a message. A number takes one byte at least, and is in a struct or two; real types stay
+/// below four.
+pub const VALUES_PER_BYTE: usize = 8;
+
+/// So many bytes of a name count as another value.
+pub const NAME_BYTES: usize = 64;
 
 /// What has a description. The derive of the same name writes it for structs and enums:
 ///

@@ -40,7 +40,7 @@ pub fn quantity_fields<T: Schema>() -> Vec<Field> {
 pub fn quantities<T: Schema + Serialize>(value: &T) -> Vec<(Field, Option<u64>)> {
     let bytes = postcard::to_stdvec(value).unwrap_or_default();
     let Ok(Value::Map(values)) = decode(&T::schema(), &bytes) else { return Vec::new() };
-    let number = |name: &str| match values.iter().find(|(known, _)| known == name)?.1 {
+    let number = |name: &str| match values.iter().find(|(known, _)| *known == *name)?.1 {
         Value::U(number) => u64::try_from(number).ok(),
         _ => None,
     };

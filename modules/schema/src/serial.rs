@@ -1,7 +1,7 @@
 //! Descriptions as serde sees them: for people as JSON; in postcard a [`Field`] is its own bytes with their length
 //! before them.
 
-use crate::{Field, decode};
+use crate::Field;
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt;
@@ -18,8 +18,9 @@ impl Serialize for Field {
             }
         }
         map.serialize_entry("type", &self.ty)?;
-        for (key, bound) in [("min", &self.least), ("max", &self.most)] {
-            if let Some(value) = bound.as_ref().and_then(|bound| decode(&self.ty, bound).ok()) {
+        let (least, most) = self.bounds();
+        for (key, bound) in [("min", least), ("max", most)] {
+            if let Some(value) = bound {
                 map.serialize_entry(key, &value)?;
             }
         }

@@ -1,6 +1,6 @@
 //! Values for people: one line of text, and numbers to plot.
 
-use crate::Value;
+use crate::{Label, Value};
 use std::fmt::{self, Write};
 
 /// How many elements of a list [`Value`]'s `Display` prints.
@@ -116,11 +116,12 @@ fn show_name(name: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
 }
 
 /// A value of a type that is a word, as the key of a map: without quotes, and exact.
-pub(crate) fn word(value: &Value) -> String {
+pub(crate) fn word(value: &Value) -> Label {
     match value {
-        Value::Char(char) => char.to_string(),
-        Value::Text(text) | Value::Variant(text, _) => text.clone(),
-        other => other.to_string(),
+        Value::Char(char) => Label::from(&*char.encode_utf8(&mut [0; 4])),
+        Value::Text(text) => Label::from(&**text),
+        Value::Variant(name, _) => name.clone(),
+        other => other.to_string().into(),
     }
 }
 

@@ -1,6 +1,5 @@
 //! What types are made of.
 
-use crate::decode;
 use serde::Serialize;
 
 /// What a value is, and how its bytes are to be read.
@@ -9,7 +8,7 @@ use serde::Serialize;
 /// use rohrpost_schema::{Schema, Type};
 /// assert_eq!(<Option<[f32; 3]>>::schema(), Type::option(Type::Array(3, Box::new(Type::F32))));
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Type {
     /// Nothing.
@@ -79,7 +78,7 @@ pub enum Type {
 /// let point = Named::new("Point", point).said("A place in the plane.");
 /// assert_eq!(point.members.fields().len(), 2);
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Named {
     /// A name that others may rely on: it is of the author's choice, counts in hashes, and stays when code is moved.
     pub name: String,
@@ -91,7 +90,7 @@ pub struct Named {
 }
 
 /// What a struct or variant has in it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Members {
     /// Nothing.
@@ -114,7 +113,7 @@ pub enum Members {
 /// assert_eq!(speed.range().unwrap(), "at least 0");
 /// assert_eq!(speed.with_unit("0.5"), "0.5 m/s");
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Field {
     /// Its name; empty where it has none.
     pub name: String,
@@ -151,15 +150,9 @@ impl Field {
         self
     }
 
-    /// What values it may have, in words, without the unit: `0..=1.5`, `at least 1`; none when nothing bounds it.
-    pub fn range(&self) -> Option<String> {
-        let bound = |bytes: &Option<Vec<u8>>| decode(&self.ty, bytes.as_ref()?).ok().map(|value| value.to_string());
-        match (bound(&self.least), bound(&self.most)) {
-            (Some(least), Some(most)) => Some(format!("{least}..={most}")),
-            (Some(least), None) => Some(format!("at least {least}")),
-            (None, Some(most)) => Some(format!("at most {most}")),
-            (None, None) => None,
-        }
+    pub(crate) fn memory_bytes(&self) -> usize {
+        let bounds = [&self.least, &self.most].into_iter().flatten().map(Vec::len).sum::<usize>();
+        size_of::<Self>() + self.name.len() + self.text.len() + self.unit.len() + bounds + self.ty.memory_bytes()
     }
 
     /// A text with this field's unit behind it.
@@ -182,6 +175,13 @@ impl Named {
     }
 }
 
+impl Named {
+    fn memory_bytes(&self) -> usize {
+        let fields = self.members.fields().iter().map(Field::memory_bytes);
+        size_of::<Self>() + self.name.len() + self.text.len() + fields.sum::<usize>()
+    }
+}
+
 impl Members {
     /// Those that there are, in the order of their bytes.
     pub fn fields(&self) -> &[Field] {
@@ -194,6 +194,28 @@ impl Members {
 }
 
 impl Type {
+    /// Memory that it needs with all that is in it, bytes: for readers that keep types of others. Room that vectors
+    /// have besides is not in it; they grow to less than twice.
+    ///
+    /// ```
+    /// use rohrpost_schema::{Schema, Type};
+    ///
+    /// assert_eq!(<[u8; 9]>::schema().memory_bytes(), 2 * Type::U8.memory_bytes());
+    /// ```
+    pub fn memory_bytes(&self) -> usize {
+        let inside = match self {
+            Self::Option(inner) | Self::List(inner) | Self::Array(_, inner) => inner.memory_bytes(),
+            Self::Map(key, value) => key.memory_bytes() + value.memory_bytes(),
+            Self::Tuple(elements) => elements.iter().map(Self::memory_bytes).sum(),
+            Self::Struct(named) => named.memory_bytes(),
+            Self::Enum { name, text, variants } => {
+                name.len() + text.len() + variants.iter().map(Named::memory_bytes).sum::<usize>()
+            }
+            _ => 0,
+        };
+        size_of::<Self>() + inside
+    }
+
     /// This or nothing.
     ///
     /// ```

@@ -1,5 +1,7 @@
 //! Data of a type that is known from a description alone.
 
+use crate::Label;
+
 /// Data of an unknown Rust type.
 ///
 /// Each type has one form, the one that [`decode`](crate::decode) gives; [`encode`](crate::encode) takes more, see
@@ -38,9 +40,9 @@ pub enum Value {
     /// Elements of a list or tuple.
     List(Vec<Value>),
     /// Fields of a struct, or entries of a map.
-    Map(Vec<(String, Value)>),
+    Map(Vec<(Label, Value)>),
     /// A choice by name, and what it carries (`Null`: nothing).
-    Variant(String, Box<Value>),
+    Variant(Label, Box<Value>),
 }
 
 impl Value {
@@ -51,7 +53,7 @@ impl Value {
     ///
     /// assert_eq!(Value::unit_variant("Left"), Value::Variant("Left".into(), Box::new(Value::Null)));
     /// ```
-    pub fn unit_variant(name: impl Into<String>) -> Self {
+    pub fn unit_variant(name: impl Into<Label>) -> Self {
         Self::Variant(name.into(), Box::new(Self::Null))
     }
 }

@@ -1,9 +1,10 @@
 //! Commands that a module ran, with its answers: for a player that stands in for it.
 
-use super::entry::{Entries, Tag};
+use super::entry::Entries;
 use super::event::{EventAt, JournalEvent};
 use super::outputs::NotedReply;
 use super::run::{ExactRun, RunError};
+use super::tag::Tag;
 use super::value::NotedValue;
 use rohrpost_schema::Bytes;
 use serde::{Deserialize, Serialize};

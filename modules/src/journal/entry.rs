@@ -9,6 +9,7 @@
 //! ```
 
 use super::bytes::{digest, spread};
+use super::tag::Tag;
 use serde::Serialize;
 use std::io::{self, Read};
 
@@ -16,175 +17,8 @@ use std::io::{self, Read};
 pub(super) const VERSION: u32 = 3;
 /// Bytes before the tag.
 const HEAD_BYTES: usize = 12;
-
-/// The kind of an entry.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
-pub(crate) enum Tag {
-    /// The first one.
-    Begin = 1,
-    /// The module is called.
-    Event,
-    /// Answers: a reading of the clock,
-    Time,
-    /// what the clock goes by,
-    TimeRecord,
-    /// whether a stream could be opened,
-    Opened,
-    /// where its reader stands,
-    Position,
-    /// whether there is a next record,
-    HasNext,
-    /// how many it has read and lost,
-    Accounts,
-    /// its newest record,
-    Newest,
-    /// its next one,
-    Next,
-    /// one by its sequence,
-    Record,
-    /// those around a time,
-    Around,
-    /// whether a command went out,
-    Begun,
-    /// what came of it,
-    Answered,
-    /// whether a record was written,
-    Wrote,
-    /// which record the next entry has, that is recorded anyhow,
-    Named,
-    /// what the module took in by itself,
-    TakenIn,
-    /// whether it could open a descriptor by itself,
-    OpenedOutside,
-    /// watch one,
-    Watched,
-    /// and watch it no longer,
-    Unwatched,
-    /// what came of what it gave out by itself.
-    Accepted,
-    /// Asked without an answer: to go on from another record,
-    Sought,
-    /// to tick,
-    Ticking,
-    /// for data,
-    Subscribed,
-    /// for older records of a followed stream,
-    Rewound,
-    /// for a mailbox.
-    MadeMailbox,
-    /// A file that it was given.
-    File,
-    /// Outputs: data,
-    Published,
-    /// a record of its own stream,
-    Written,
-    /// a command,
-    Called,
-    /// a reply,
-    Replied,
-    /// bytes past its interfaces,
-    GaveOut,
-    /// why it is in error,
-    Failed,
-    /// why it panicked.
-    Panicked,
-    /// Something that a journal does not see.
-    Hole,
-    /// The module ended as it should.
-    End,
-    /// One more answer, behind all others since it is younger: what a reader missed, by cause.
-    Missed,
-}
-
-const ALL: [Tag; 37] = [
-    Tag::Begin,
-    Tag::Event,
-    Tag::Time,
-    Tag::TimeRecord,
-    Tag::Opened,
-    Tag::Position,
-    Tag::HasNext,
-    Tag::Accounts,
-    Tag::Newest,
-    Tag::Next,
-    Tag::Record,
-    Tag::Around,
-    Tag::Begun,
-    Tag::Answered,
-    Tag::Wrote,
-    Tag::Named,
-    Tag::TakenIn,
-    Tag::OpenedOutside,
-    Tag::Watched,
-    Tag::Unwatched,
-    Tag::Accepted,
-    Tag::Sought,
-    Tag::Ticking,
-    Tag::Subscribed,
-    Tag::Rewound,
-    Tag::MadeMailbox,
-    Tag::File,
-    Tag::Published,
-    Tag::Written,
-    Tag::Called,
-    Tag::Replied,
-    Tag::GaveOut,
-    Tag::Failed,
-    Tag::Panicked,
-    Tag::Hole,
-    Tag::End,
-    Tag::Missed,
-];
-
-impl Tag {
-    fn from_code(code: u8) -> Option<Self> {
-        ALL.get(usize::from(code).checked_sub(1)?).copied()
-    }
-
-    /// What a module does there.
-    pub(super) fn words(self) -> &'static str {
-        match self {
-            Self::Begin => "begins",
-            Self::Event => "is called",
-            Self::Time => "reads the clock",
-            Self::TimeRecord => "asks what the clock goes by",
-            Self::Opened => "opens a stream",
-            Self::Position => "asks where it stands in a stream",
-            Self::HasNext => "asks whether a stream has a next record",
-            Self::Accounts => "asks how many records it has read",
-            Self::Newest => "reads the newest record of a stream",
-            Self::Next => "reads the next record of a stream",
-            Self::Record => "reads a record of a stream",
-            Self::Around => "looks for a time in a stream",
-            Self::Begun => "hands a command over",
-            Self::Answered => "waits for an answer",
-            Self::Wrote => "ends a record of its stream",
-            Self::Named => "is given what is recorded anyhow",
-            Self::TakenIn => "takes something in (`take_in`)",
-            Self::OpenedOutside => "opens a descriptor (`open_outside`)",
-            Self::Watched => "waits for a descriptor",
-            Self::Unwatched => "waits for a descriptor no longer",
-            Self::Accepted => "asks what came of what it gave out",
-            Self::Sought => "goes on elsewhere in a stream",
-            Self::Ticking => "wants to tick",
-            Self::Subscribed => "subscribes",
-            Self::Rewound => "goes back in a followed stream",
-            Self::MadeMailbox => "makes a mailbox",
-            Self::File => "asks for a file",
-            Self::Published => "publishes data",
-            Self::Written => "writes a record",
-            Self::Called => "sends a command",
-            Self::Replied => "replies to a command",
-            Self::GaveOut => "gives bytes out (`give_out`)",
-            Self::Failed => "fails",
-            Self::Panicked => "panics",
-            Self::Hole => "does what no journal sees",
-            Self::End => "ends",
-            Self::Missed => "asks which records it has missed",
-        }
-    }
-}
+/// Tag and content of an entry. One of them is in memory when a journal is read, and a recording may have any.
+pub(super) const ENTRY_BYTES_MAX: u32 = 64 << 20;
 
 /// Appends an entry, of which the one before had the sum `before`; its own sum.
 pub(super) fn append<T: Serialize + ?Sized>(
@@ -197,12 +31,12 @@ pub(super) fn append<T: Serialize + ?Sized>(
     let mut counted = Counted { bytes: std::mem::take(to) };
     let written = postcard::serialize_with_flavor::<T, &mut Counted, ()>(content, &mut counted);
     *to = counted.bytes;
-    if let Err(error) = written {
+    let sealed = written.and_then(|()| seal(to, begin, before));
+    if sealed.is_err() {
         // What fails leaves no half an entry behind.
         to.truncate(begin);
-        return Err(error);
     }
-    seal(to, begin, before)
+    sealed
 }
 
 /// Room for the head of an entry, and its tag; where it begins.
@@ -221,7 +55,8 @@ fn check(before: u32, len: u32) -> u32 {
 /// Fills in the head of the entry that begins there.
 fn seal(to: &mut [u8], begin: usize, before: u32) -> Result<u32, postcard::Error> {
     let body = begin + HEAD_BYTES;
-    let len = u32::try_from(to.len() - body).map_err(|_| postcard::Error::SerializeBufferFull)?;
+    let len = u32::try_from(to.len() - body).ok().filter(|len| *len <= ENTRY_BYTES_MAX);
+    let len = len.ok_or(postcard::Error::SerializeBufferFull)?;
     let sum = digest(before.into(), &to[body..]) as u32;
     for (word, at) in [len, check(before, len), sum].into_iter().zip((begin..).step_by(4)) {
         to[at..at + 4].copy_from_slice(&word.to_le_bytes());
@@ -269,6 +104,8 @@ pub(super) enum NoEntry {
     Cut,
     /// An entry is changed, or one before it is missing.
     Sum,
+    /// It is longer than any: so many bytes.
+    Long(u32),
     /// It is of a kind that this version does not know.
     Tag(u8),
     /// The file cannot be read.
@@ -325,6 +162,9 @@ impl<R: Read> Entries<R> {
         if check(self.sum, len) != checked {
             return Err(NoEntry::Sum);
         }
+        if len > ENTRY_BYTES_MAX {
+            return Err(NoEntry::Long(len));
+        }
         self.fill(len.into())?;
         if self.body.len() < len as usize {
             return Err(NoEntry::Cut);
@@ -346,6 +186,7 @@ impl<R: Read> Entries<R> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::bytes::Blob;
     use super::*;
 
     fn two() -> (Vec<u8>, u32, usize) {
@@ -362,12 +203,17 @@ mod tests {
         Ok((tag, entries.content().to_vec()))
     }
 
+    /// Also if the length is confirmed.
     #[test]
-    fn tags_are_their_places() {
-        for (code, tag) in (1..).zip(ALL) {
-            assert_eq!((tag as u8, Tag::from_code(code)), (code, Some(tag)));
+    fn an_entry_of_gigabytes_is_neither_read_nor_written() {
+        for len in [ENTRY_BYTES_MAX + 1, u32::MAX] {
+            let head = [len, check(0, len), 0].map(u32::to_le_bytes).concat();
+            let mut entries = Entries::new(head.chain(std::io::repeat(7)));
+            assert_eq!(entries.look(), Err(NoEntry::Long(len)));
+            assert!(entries.body.capacity() < 1 << 10, "nothing was taken for it");
         }
-        assert_eq!((Tag::from_code(0), Tag::from_code(38)), (None, None));
+        let (mut bytes, long) = (Vec::new(), vec![0; ENTRY_BYTES_MAX as usize]);
+        assert!(append(&mut bytes, 0, Tag::Published, &Blob(&long)).is_err() && bytes.is_empty());
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! A journal in words.
 
-use super::entry::{Entries, NoEntry, Tag};
+use super::entry::{ENTRY_BYTES_MAX, Entries, NoEntry};
 use super::event::EventAt;
 use super::outputs::{KnownTypes, describe};
+use super::tag::Tag;
 use std::io::Read;
 
 /// Tells all entries, up to where the journal ends, or cannot be read any further, or `tell` says false.
@@ -31,6 +32,7 @@ fn words(damage: NoEntry) -> String {
     match damage {
         NoEntry::End | NoEntry::Cut => "(the journal is cut off within an entry)".into(),
         NoEntry::Sum => "(an entry is damaged or missing)".into(),
+        NoEntry::Long(len) => format!("(an entry of {len} bytes, and {ENTRY_BYTES_MAX} are read)"),
         NoEntry::Tag(tag) => format!("(an entry of an unknown kind, {tag})"),
         NoEntry::Unreadable(kind) => format!("(its file cannot be read: {kind})"),
     }

@@ -1,9 +1,10 @@
 //! What a module sends and says, as its journal has it.
 
-use super::entry::{Tag, VERSION};
+use super::entry::VERSION;
 use super::event::JournalEvent;
 use super::question::Question;
 use super::records::NamedRecord;
+use super::tag::Tag;
 use super::value::{NotedValue, in_hex};
 use rohrpost_mailbox::Name;
 use rohrpost_schema::{Description, Type, decode};

@@ -3,11 +3,12 @@
 //! The first thing that differs ends the process: nothing behind it would mean anything, and no code of the module is
 //! to run on a made-up answer. What was found is in a file by then.
 
-use super::entry::{Entries, NoEntry, Tag};
+use super::entry::{ENTRY_BYTES_MAX, Entries, NoEntry};
 use super::event::{EventAt, JournalEvent};
 use super::outputs::{Begin, KnownTypes, describe};
 use super::question::Question;
 use super::records::{NamedRecord, RecordSum, Records};
+use super::tag::Tag;
 use super::verdict::{Difference, ReplayReport, ReplayVerdict};
 use rohrpost_schema::Description;
 use serde::{Deserialize, Serialize};
@@ -118,6 +119,9 @@ impl JournalReplay {
                 None => self.progress.stop(ReplayVerdict::Identical { is_whole: false }),
             },
             Err(NoEntry::Sum) => self.refuse("an entry of the journal is damaged or missing here"),
+            Err(NoEntry::Long(len)) => {
+                self.refuse(&format!("an entry of the journal has {len} bytes, and {ENTRY_BYTES_MAX} are read"))
+            }
             Err(NoEntry::Tag(tag)) => self.refuse(&format!("an entry of the journal is of an unknown kind, {tag}")),
             Err(NoEntry::Unreadable(kind)) => self.refuse(&format!("the journal cannot be read here: {kind}")),
         }

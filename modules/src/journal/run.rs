@@ -1,11 +1,12 @@
 //! A module's run, as a file for the program that is to repeat it.
 
 use super::bytes::Blob;
-use super::entry::{Entries, NoEntry, Tag, VERSION};
+use super::entry::{Entries, NoEntry, VERSION};
 use super::list;
 use super::outputs::Begin;
 use super::records::{NamedRecord, RecordSum, Records};
 use super::replay::JournalReplay;
+use super::tag::Tag;
 use rohrpost_config::{Installation, Saved};
 use rohrpost_mailbox::Name;
 use serde::{Deserialize, Serialize};
@@ -127,7 +128,7 @@ impl ExactRun {
             },
             Ok(_) => "its beginning is missing".into(),
             Err(NoEntry::End | NoEntry::Cut) => "it is cut off in its beginning".into(),
-            Err(NoEntry::Sum | NoEntry::Tag(_)) => {
+            Err(NoEntry::Sum | NoEntry::Long(_) | NoEntry::Tag(_)) => {
                 "its beginning is damaged, or it is of another version (`rohrpost record info` says of which)".into()
             }
             Err(NoEntry::Unreadable(kind)) => format!("its file cannot be read: {kind}"),

@@ -4,8 +4,9 @@
 //! [`WAIT_NS`] old: no system call and no memory is taken for that. A panic hands on what is there. A process that is
 //! killed takes what it has not handed on with it, and its journal ends before.
 
-use super::entry::{self, Tag};
+use super::entry;
 use super::run::{PIECE_HEAD_BYTES, Piece};
+use super::tag::Tag;
 use rohrpost_config::JOURNAL;
 use rohrpost_mailbox::{Stamp, StreamWriter, SystemClock};
 use serde::Serialize;

@@ -68,3 +68,13 @@ fn a_file_has_no_more_types_than_a_description_may_have() {
     let file = changed(|json| json["data"][0]["type"] = json!({ "tuple": tuple }));
     assert_eq!(read(&file).unwrap_err().to_string(), "no interface: more than 16384 types");
 }
+
+/// A file of two megabytes would take a hundred times as much memory.
+#[test]
+fn a_file_of_too_many_values_is_refused_before_they_are_made() {
+    let text = format!("{{\"data\": [{}0]}}", "{\"\":0},".repeat(200_000));
+    let says = "more than 262144 values of JSON; an interface has at most 16384 types, and needs fewer";
+    assert_eq!(read(&text).unwrap_err().to_string(), says);
+    let said = changed(|json| json["text"] = json!(",[{\\\"".repeat(100_000)));
+    assert!(read(&said).is_ok(), "what is in a text does not count");
+}

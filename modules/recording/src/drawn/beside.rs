@@ -6,6 +6,10 @@ use crate::read::definitions::Definition;
 use crate::shape::Shape;
 use std::collections::BTreeMap;
 
+/// A longer message of which nothing comes is the last one of its period that is decoded: a package of others may take
+/// milliseconds.
+const ANEW_BYTES_MAX: usize = 4 << 10;
+
 /// That a recording has drawn channels beside what it records.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DrawnBeside {
@@ -60,7 +64,7 @@ impl DrawingBeside {
         }
         let drawn = self.drawer.draw(id, &sampled.channel, stamp_ns, data).unwrap_or_default();
         // A long one of which nothing comes is not decoded again and again.
-        if !drawn.is_empty() || data.len() > TWICE_BYTES_MAX {
+        if !drawn.is_empty() || data.len() > ANEW_BYTES_MAX {
             sampled.period = period;
         }
         drawn
@@ -88,8 +92,8 @@ mod tests {
     #[test]
     fn a_long_message_of_which_nothing_comes_is_decoded_once_a_period() {
         let mut drawing = DrawingBeside::new(&DrawnBeside { period_ns: PERIOD_NS, classes: BTreeMap::new() });
-        let schema = SchemaText { name: "its type".into(), encoding: SCHEMA_ENCODING.into(), data: Vec::new() };
-        let schema = Arc::new(SchemaText { data: Image::<Bytes>::schema().to_bytes(), ..schema });
+        let data = Image::<Bytes>::schema().to_bytes();
+        let schema = Arc::new(SchemaText::new("its type".into(), SCHEMA_ENCODING.into(), data));
         let (topic, message_encoding) = ("eye.0/sight".into(), MESSAGE_ENCODING.into());
         drawing.add(0, Definition { topic, message_encoding, texts: BTreeMap::new(), schema });
         for (at_ns, rows, is_whole, is_drawn, why) in [

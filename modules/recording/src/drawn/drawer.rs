@@ -34,7 +34,7 @@ pub(crate) struct Drawer {
 struct DrawnChannel {
     module: String,
     shape: Shape,
-    ty: Type,
+    ty: Arc<Type>,
     /// As the file has them, once there is a message: by kind, and whether they are reduced.
     kinds: BTreeMap<(Kind, bool), Arc<Definition>>,
 }
@@ -124,7 +124,7 @@ impl Drawer {
 
 impl DrawnChannel {
     fn of(channel: &Definition) -> Option<Self> {
-        let ty = channel.schema.ty().filter(|_| channel.message_encoding == MESSAGE_ENCODING)?;
+        let ty = channel.schema.ty().filter(|_| channel.message_encoding == MESSAGE_ENCODING)?.clone();
         let module = channel.texts.get(key::NAME).unwrap_or(&channel.topic).clone();
         Some(Self { module, shape: Shape::of(&ty)?, ty, kinds: BTreeMap::new() })
     }
@@ -146,10 +146,10 @@ fn drawn_channel(topic: &str, kind: Kind, is_reduced: bool, of: &Definition, sch
         topic: format!("{topic}/{}", kind.suffix()),
         message_encoding: schema::MESSAGE_ENCODING.into(),
         texts,
-        schema: Arc::new(SchemaText {
-            name: format!("foxglove.{}", kind.message_name()),
-            encoding: schema::SCHEMA_ENCODING.into(),
-            data: schema.to_vec(),
-        }),
+        schema: Arc::new(SchemaText::new(
+            format!("foxglove.{}", kind.message_name()),
+            schema::SCHEMA_ENCODING.into(),
+            schema.to_vec(),
+        )),
     })
 }

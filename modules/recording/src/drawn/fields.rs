@@ -1,9 +1,9 @@
 //! Fields of a value, by their names.
 
-use rohrpost_schema::Value;
+use rohrpost_schema::{Label, Value};
 
 /// Fields of a struct. What is not there, or is something else, is none.
-pub(crate) struct ValueFields(Vec<(String, Value)>);
+pub(crate) struct ValueFields(Vec<(Label, Value)>);
 
 impl ValueFields {
     pub(crate) fn of(value: Value) -> Option<Self> {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// What is drawn of a value, with a bound or without.
 fn drawn<T: Data>(value: &T, bytes_max: Option<usize>) -> Vec<DrawnMessage> {
-    let schema = SchemaText { name: "its type".into(), encoding: SCHEMA_ENCODING.into(), data: T::schema().to_bytes() };
+    let schema = SchemaText::new("its type".into(), SCHEMA_ENCODING.into(), T::schema().to_bytes());
     let channel = Definition {
         topic: "eye.0/sight".into(),
         message_encoding: MESSAGE_ENCODING.into(),

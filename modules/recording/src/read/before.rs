@@ -55,7 +55,7 @@ pub(crate) fn newest_before(path: &Path, selection: &Selection) -> Result<Vec<Ea
 }
 
 fn places(frames: &mut Frames, index: &Index, selection: &Selection, from_ns: u64) -> Result<Vec<Place>, ReadError> {
-    let is_words = |channel: &Definition| channel.schema.ty().as_ref().and_then(Shape::of) == Some(Shape::Line);
+    let is_words = |channel: &Definition| channel.schema.ty().and_then(|ty| Shape::of(ty)) == Some(Shape::Line);
     let is_wanted = |channel: &Definition| {
         selection.has_channel(channel) && !channel.texts.contains_key(key::DRAWN) && !is_words(channel)
     };
@@ -90,7 +90,7 @@ fn messages_at(contents: &mut Contents, places: &[Place]) -> Result<Vec<EarlierM
     let Some(first) = places.first() else { return Ok(Vec::new()) };
     contents.open_chunk(first.chunk_at)?;
     let mut found: BTreeMap<u16, EarlierMessage> = BTreeMap::new();
-    while let Some(item) = contents.next_in_chunk() {
+    while let Some(item) = contents.next_in_chunk()? {
         match item {
             Item::Message(its) => {
                 let (id, log_ns) = (its.header.channel_id, its.header.log_time);

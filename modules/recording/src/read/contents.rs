@@ -1,10 +1,10 @@
 //! Messages and metadata of a file, in its order.
 
-use crate::error::{Damage, ReadError, Shown};
+use crate::error::{Damage, FileLimit, ReadError, Shown};
 use crate::format::{is_our_word, op};
 use crate::read::ahead::{AheadRecord, ReadAhead};
 use crate::read::chunk;
-use crate::read::definitions::{Definition, Definitions};
+use crate::read::definitions::{Definition, Definitions, Untaken};
 use crate::read::frames::{Frames, Step};
 use crate::read::index::Index;
 use mcap::records::{ChunkIndex, Header, MessageHeader, Metadata, Record};
@@ -158,7 +158,7 @@ impl Contents {
     pub(crate) fn next(&mut self) -> Result<Option<Item>, ReadError> {
         while self.ending.is_none() {
             let found = match self.in_chunk {
-                Some(_) => self.next_in_chunk(),
+                Some(_) => self.next_in_chunk()?,
                 None => self.next_outside()?,
             };
             if found.is_some() {
@@ -215,30 +215,37 @@ impl Contents {
         }
     }
 
+    /// As an error of what reads any file.
+    pub(crate) fn too_much(&self, limit: FileLimit) -> ReadError {
+        ReadError::TooMuch { path: Shown(self.path().to_owned()), limit }
+    }
+
     /// The next thing in the present chunk.
-    pub(crate) fn next_in_chunk(&mut self) -> Option<Item> {
+    pub(crate) fn next_in_chunk(&mut self) -> Result<Option<Item>, ReadError> {
         loop {
-            let at = self.in_chunk?;
+            let Some(at) = self.in_chunk else { return Ok(None) };
             let Some((op, body)) = chunk::record_at(&self.records, at) else {
                 self.in_chunk = None;
                 if self.is_cut {
                     self.ending = Some(Ending::Open);
                 } else if at != self.records.len() {
-                    return Some(Item::Damaged(self.begins, Damage::Record { op: op::CHUNK }));
+                    return Ok(Some(Item::Damaged(self.begins, Damage::Record { op: op::CHUNK })));
                 }
-                return None;
+                return Ok(None);
             };
             self.in_chunk = Some(body.end);
             let told = match op {
                 op::MESSAGE => match self.found(body, true) {
-                    Ok(found) => return Some(Item::Message(found)),
-                    Err(damage) => Err(damage),
+                    Ok(found) => return Ok(Some(Item::Message(found))),
+                    Err(damage) => Err(damage.into()),
                 },
                 op::SCHEMA | op::CHANNEL => self.definitions.add(op, &self.records[body]),
                 _ => Ok(()),
             };
-            if let Err(damage) = told {
-                return Some(Item::Damaged(self.begins, damage));
+            match told {
+                Ok(()) => {}
+                Err(Untaken::Damaged(damage)) => return Ok(Some(Item::Damaged(self.begins, damage))),
+                Err(Untaken::TooMuch(limit)) => return Err(self.too_much(limit)),
             }
         }
     }
@@ -302,7 +309,11 @@ impl Contents {
                 self.enter_chunk(unpacked).map(|()| None)
             }
             op::MESSAGE => self.found(0..self.frames.body().len(), false).map(|found| Some(Item::Message(found))),
-            op::SCHEMA | op::CHANNEL => self.definitions.add(op, self.frames.body()).map(|()| None),
+            op::SCHEMA | op::CHANNEL => match self.definitions.add(op, self.frames.body()) {
+                Ok(()) => Ok(None),
+                Err(Untaken::Damaged(damage)) => Err(damage),
+                Err(Untaken::TooMuch(limit)) => return Err(self.too_much(limit)),
+            },
             op::HEADER | op::METADATA => match mcap::parse_record(op, self.frames.body()) {
                 Ok(Record::Metadata(metadata)) => Ok(Some(Item::Metadata(metadata))),
                 Ok(Record::Header(header)) => {

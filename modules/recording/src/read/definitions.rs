@@ -1,11 +1,16 @@
 //! Channels and their types, as a file describes them.
 
-use crate::error::Damage;
+use crate::error::{Damage, FileLimit};
 use crate::format::{SCHEMA_ENCODING, is_of_others, key};
+use crate::read::cost::DescribedBytes;
 use mcap::records::{Header, Record};
 use rohrpost_schema::{Type, describe_type};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// What a channel takes besides its texts, and how often these are there: a map has nodes, and readers have copies.
+const CHANNEL_BYTES: usize = 512;
+const TEXTS_FACTOR: usize = 8;
 
 /// A channel and its type.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,18 +21,25 @@ pub(crate) struct Definition {
     pub(crate) schema: Arc<SchemaText>,
 }
 
-/// A type, as it is described.
+/// A type, as it is described: once for all of its channels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SchemaText {
     pub(crate) name: String,
     pub(crate) encoding: String,
     pub(crate) data: Vec<u8>,
+    ty: Option<Arc<Type>>,
 }
 
 impl SchemaText {
+    pub(crate) fn new(name: String, encoding: String, data: Vec<u8>) -> Self {
+        let is_ours = encoding == SCHEMA_ENCODING;
+        let ty = if is_ours { Type::from_bytes(&data).ok().map(Arc::new) } else { None };
+        Self { name, encoding, data, ty }
+    }
+
     /// Of one of our types.
-    pub(crate) fn ty(&self) -> Option<Type> {
-        if self.encoding == SCHEMA_ENCODING { Type::from_bytes(&self.data).ok() } else { None }
+    pub(crate) fn ty(&self) -> Option<&Arc<Type>> {
+        self.ty.as_ref()
     }
 
     /// Whether values of one are values of the other. Of our types, texts and ranges do not count.
@@ -40,7 +52,7 @@ impl SchemaText {
 
     /// For people.
     pub(crate) fn describe(&self) -> String {
-        self.ty().map_or_else(|| format!("{} ({})", self.name, self.encoding), |ty| describe_type(&ty))
+        self.ty().map_or_else(|| format!("{} ({})", self.name, self.encoding), |ty| describe_type(ty))
     }
 }
 
@@ -63,6 +75,26 @@ pub(crate) struct Definitions {
     channels: BTreeMap<u16, Arc<Definition>>,
     /// Of another program: texts under our keys mean nothing, and are left out.
     are_others: bool,
+    memory: DescribedBytes,
+}
+
+/// Why a record of a schema or channel is not taken.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Untaken {
+    Damaged(Damage),
+    TooMuch(FileLimit),
+}
+
+impl From<Damage> for Untaken {
+    fn from(damage: Damage) -> Self {
+        Self::Damaged(damage)
+    }
+}
+
+impl From<FileLimit> for Untaken {
+    fn from(limit: FileLimit) -> Self {
+        Self::TooMuch(limit)
+    }
 }
 
 impl Definitions {
@@ -84,12 +116,23 @@ impl Definitions {
         self.channels.iter().map(|(id, definition)| (*id, definition))
     }
 
+    /// What all of it takes.
+    pub(crate) fn memory(&self) -> DescribedBytes {
+        self.memory
+    }
+
     /// Reads a record of a schema or channel. The same again is no news.
-    pub(crate) fn add(&mut self, op: u8, body: &[u8]) -> Result<(), Damage> {
+    pub(crate) fn add(&mut self, op: u8, body: &[u8]) -> Result<(), Untaken> {
         match mcap::parse_record(op, body).map_err(|_| Damage::Record { op })? {
             Record::Schema { header, data } => {
-                let schema = SchemaText { name: header.name, encoding: header.encoding, data: data.into_owned() };
-                insert(&mut self.schemas, header.id, Arc::new(schema))
+                if let Some(known) = self.schemas.get(&header.id) {
+                    let is_same =
+                        (&known.name, &known.encoding, &*known.data) == (&header.name, &header.encoding, &*data);
+                    return if is_same { Ok(()) } else { Err(Damage::Redefined(header.id).into()) };
+                }
+                let schema = SchemaText::new(header.name, header.encoding, data.into_owned());
+                self.memory.add(body.len(), schema.ty().map_or(0, |ty| ty.memory_bytes()))?;
+                self.schemas.insert(header.id, Arc::new(schema));
             }
             Record::Channel(channel) => {
                 let schema = match channel.schema_id {
@@ -100,20 +143,15 @@ impl Definitions {
                 if self.are_others {
                     texts.retain(|key, _| !key::ALL.contains(&key.as_str()));
                 }
-                insert(&mut self.channels, id, Arc::new(Definition { topic, message_encoding, texts, schema }))
+                let channel = Arc::new(Definition { topic, message_encoding, texts, schema });
+                if let Some(known) = self.channels.get(&id) {
+                    return if *known == channel { Ok(()) } else { Err(Damage::Redefined(id).into()) };
+                }
+                self.memory.add(CHANNEL_BYTES + TEXTS_FACTOR * body.len(), 0)?;
+                self.channels.insert(id, channel);
             }
-            _ => Err(Damage::Record { op }),
+            _ => return Err(Damage::Record { op }.into()),
         }
-    }
-}
-
-fn insert<T: PartialEq>(all: &mut BTreeMap<u16, T>, id: u16, new: T) -> Result<(), Damage> {
-    match all.get(&id) {
-        Some(known) if *known != new => Err(Damage::Redefined(id)),
-        Some(_) => Ok(()),
-        None => {
-            all.insert(id, new);
-            Ok(())
-        }
+        Ok(())
     }
 }

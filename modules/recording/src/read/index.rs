@@ -2,7 +2,7 @@
 
 use crate::error::{Damage, ReadError, Shown};
 use crate::format::op;
-use crate::read::definitions::Definitions;
+use crate::read::definitions::{Definitions, Untaken};
 use crate::read::frames::{Frames, HEAD_BYTES, Step};
 use mcap::records::{ChunkIndex, MessageIndex, MetadataIndex, Record, Statistics};
 
@@ -103,18 +103,22 @@ impl Reading {
             self.sum.update(&[op]);
             self.sum.update(&(body.len() as u64).to_le_bytes());
             self.sum.update(body);
-            if let Err(damage) = self.record(op, body) {
-                return Ok(Some(damage));
+            match self.record(op, body) {
+                Ok(()) => {}
+                Err(Untaken::Damaged(damage)) => return Ok(Some(damage)),
+                Err(Untaken::TooMuch(limit)) => {
+                    return Err(ReadError::TooMuch { path: Shown(frames.path().to_owned()), limit });
+                }
             }
         }
         Ok((frames.at() != footer_at).then_some(Damage::SummarySum))
     }
 
-    fn record(&mut self, op: u8, body: &[u8]) -> Result<(), Damage> {
+    fn record(&mut self, op: u8, body: &[u8]) -> Result<(), Untaken> {
         match op {
             op::SCHEMA | op::CHANNEL => match self.definitions.add(op, body) {
                 // Others may describe channels here again and schemas not.
-                Err(Damage::UnknownSchema(_)) => return Ok(()),
+                Err(Untaken::Damaged(Damage::UnknownSchema(_))) => return Ok(()),
                 told => return told,
             },
             op::CHUNK_INDEX | op::METADATA_INDEX | op::STATISTICS => {}

@@ -95,7 +95,7 @@ impl LastSearch<'_> {
     /// Reads what a chunk describes. Nobody can read messages of which the description is damaged.
     fn learn(&mut self, chunk: u64) {
         if self.contents.open_chunk(chunk).is_ok() {
-            while self.contents.next_in_chunk().is_some() {}
+            while let Ok(Some(_)) = self.contents.next_in_chunk() {}
         }
     }
 
@@ -116,7 +116,7 @@ impl LastSearch<'_> {
         let (chunk, id) = self.last_in?;
         self.contents.open_chunk(chunk).ok()?;
         let mut last = None;
-        while let Some(item) = self.contents.next_in_chunk() {
+        while let Ok(Some(item)) = self.contents.next_in_chunk() {
             if let Item::Message(found) = item
                 && found.header.channel_id == id
             {

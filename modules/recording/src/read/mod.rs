@@ -7,12 +7,14 @@
 //! ```
 //!
 //! `mcap` parses records. Framing and chunks are done here: its readers stop at the first damaged chunk, and trust a
-//! chunk's header, which no checksum protects. Lengths are bounded before anything is allocated for them.
+//! chunk's header, which no checksum protects. Lengths are bounded before anything is allocated for them, and what is
+//! kept of a file is counted (`cost`).
 
 pub(crate) mod ahead;
 pub(crate) mod before;
 pub(crate) mod chunk;
 pub(crate) mod contents;
+pub(crate) mod cost;
 pub(crate) mod definitions;
 pub(crate) mod frames;
 pub(crate) mod index;

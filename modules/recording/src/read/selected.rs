@@ -142,7 +142,7 @@ impl Selected {
             };
         };
         loop {
-            if let Some(item) = self.contents.next_in_chunk() {
+            if let Some(item) = self.contents.next_in_chunk()? {
                 return Ok(Some(item));
             }
             let Some(at) = chunks.next() else { return Ok(None) };
@@ -175,7 +175,7 @@ fn described(path: &Path) -> Result<Definitions, ReadError> {
 
 impl WantedChannel {
     fn new(channel: &Arc<Definition>) -> Self {
-        let is_each = channel.schema.ty().as_ref().and_then(Shape::of) == Some(Shape::Line);
+        let is_each = channel.schema.ty().and_then(|ty| Shape::of(ty)) == Some(Shape::Line);
         Self { channel: channel.clone(), is_each, period: None }
     }
 }

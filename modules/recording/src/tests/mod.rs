@@ -1,6 +1,7 @@
 //! What is written is read again; of what is cut or damaged, what is there; and a failing disk loses nothing uncounted.
 
 mod beginning;
+mod costly;
 mod cutting;
 mod damaged;
 mod disks;

@@ -64,7 +64,7 @@ fn files_are_rotated_by_size_without_a_loss_and_each_stands_alone() {
         assert_eq!((told.channels.len(), told.session["file"].clone()), (3, (number + 1).to_string()));
         assert_eq!(told.session["node"], "base");
         assert_eq!(told.configuration["robot.toml"], "system = \"demo\"\n");
-        assert!(told.channels.iter().all(|channel| channel.ty == Some(Type::Bytes)));
+        assert!(told.channels.iter().all(|channel| channel.ty.as_deref() == Some(&Type::Bytes)));
         let is_last = number + 1 == files.len();
         assert_eq!(told.closed_because.as_deref(), Some(if is_last { "ended" } else { "rotated" }));
         found.extend(read(path).0);

@@ -1,5 +1,6 @@
 //! Types that are known against types that are not; random types; tables of mistakes.
 
+mod budget;
 mod golden;
 mod random;
 mod tables;
@@ -8,7 +9,7 @@ mod zoo;
 use super::{Type, Value, WalkError, decode, describe_type, encode, numbers};
 
 fn map<const N: usize>(entries: [(&str, Value); N]) -> Value {
-    Value::Map(entries.map(|(name, value)| (name.to_owned(), value)).into())
+    Value::Map(entries.map(|(name, value)| (name.into(), value)).into())
 }
 
 fn text(text: &str) -> Value {

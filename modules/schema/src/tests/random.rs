@@ -90,7 +90,7 @@ fn sample(ty: &Type, rng: &mut ChaCha8Rng) -> Value {
         Type::Struct(named) => sample_members(&named.members, rng),
         Type::Enum { variants, .. } => {
             let variant = variants.choose(rng).unwrap();
-            Value::Variant(variant.name.clone(), Box::new(sample_members(&variant.members, rng)))
+            Value::Variant(variant.name.as_str().into(), Box::new(sample_members(&variant.members, rng)))
         }
         _ => Value::Null,
     }
@@ -102,7 +102,7 @@ fn sample_members(members: &Members, rng: &mut ChaCha8Rng) -> Value {
         Members::One(field) => sample(&field.ty, rng),
         Members::Tuple(fields) => Value::List(fields.iter().map(|field| sample(&field.ty, rng)).collect()),
         Members::Fields(fields) => {
-            Value::Map(fields.iter().map(|field| (field.name.clone(), sample(&field.ty, rng))).collect())
+            Value::Map(fields.iter().map(|field| (field.name.as_str().into(), sample(&field.ty, rng))).collect())
         }
     }
 }

@@ -17,12 +17,13 @@ from __future__ import annotations
 import struct
 from typing import Any
 
+from .budget import EMPTY_MAX, values_most, values_of_name
 from .errors import WalkError, counted, plain
 from .readers import READERS
 from .scalars import Lend, Reader
 from .tree import (
-    BOOL, BYTES, CHAR, DEPTH_MAX, EMPTY_MAX, F32, F64, TEXT, VALUES_MAX, Array, Enum, List, Map, Named, Option, Plain,
-    Struct, Tuple, Type, Variant, float_of, is_byte, is_empty, is_nullable, unwrapped,
+    BOOL, BYTES, CHAR, DEPTH_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct, Tuple, Type,
+    Variant, float_of, is_byte, is_nullable, unwrapped,
 )  # fmt: skip
 
 _READER = READERS.name
@@ -64,10 +65,6 @@ def made(python: Any, *values: Any, **named: Any) -> Any:
         raise WalkError(f"its class does not take it: {words}") from error
 
 
-def _too_many() -> WalkError:
-    return WalkError(f"more than {VALUES_MAX} values in one; send many numbers as bytes, or as lists of f32 or f64")
-
-
 class Decoder:
     """Reads one value after the other."""
 
@@ -77,15 +74,13 @@ class Decoder:
         self.at = 0
         self.depth = 0
         self.empty_left = EMPTY_MAX
-        self.left = VALUES_MAX
+        self.left = values_most(len(data))
 
     def value(self, type: Type) -> Any:
         """The next one, which is of this type."""
         if self.depth >= DEPTH_MAX:
             raise WalkError(f"nested more than {DEPTH_MAX} deep")
-        self.left -= 1
-        if self.left < 0:
-            raise _too_many()
+        self.count(1)
         before = self.at
         self.depth += 1
         value = self.unbounded(unwrapped(type))
@@ -95,6 +90,16 @@ class Decoder:
             if self.empty_left < 0:
                 raise WalkError(f"more than {EMPTY_MAX} values that take no bytes")
         return value
+
+    def count(self, values: int) -> None:
+        """So many more."""
+        self.left -= values
+        if self.left < 0:
+            raise self.too_many()
+
+    def too_many(self) -> WalkError:
+        most = values_most(len(self.data))
+        return WalkError(f"more than {most} values in one; send many numbers as bytes, or as lists of f32 or f64")
 
     def unbounded(self, type: Type) -> Any:
         if isinstance(type, Plain):
@@ -107,9 +112,9 @@ class Decoder:
         if isinstance(type, List):
             if is_byte(type.element):
                 return self.octets()
-            return self.many(type.element, self.length(type.is_of_empty))
+            return self.many(type.element, self.length(type.is_of_empty), type.is_of_empty)
         if isinstance(type, Array):
-            return self.many(type.element, type.length)
+            return self.many(type.element, self.fixed_length(type), type.is_of_empty)
         if isinstance(type, Tuple):
             return tuple(self.element(element, index) for index, element in enumerate(type.elements))
         if isinstance(type, Map):
@@ -138,11 +143,11 @@ class Decoder:
             return text
         return None
 
-    def many(self, type: Type, length: int) -> list[Any]:
+    def many(self, type: Type, length: int, is_of_empty: bool) -> list[Any]:
         if float_of(type):
             self.left += length  # They are small, and read at once otherwise.
-        if length > self.left and not is_empty(type):
-            raise _too_many()
+        if length > self.left and not is_of_empty:
+            raise self.too_many()
         return [self.element(type, index) for index in range(length)]
 
     def element(self, type: Type, index: int) -> Any:
@@ -151,8 +156,9 @@ class Decoder:
         except WalkError as error:
             raise error.within(f"[{index}]") from None
 
-    def member(self, type: Type, name: str) -> Any:
+    def field(self, type: Type, name: str) -> Any:
         try:
+            self.count(values_of_name(name))
             return self.value(type)
         except WalkError as error:
             raise error.within(name) from None
@@ -164,20 +170,23 @@ class Decoder:
             return self.value(named.fields[0].type)
         if named.kind == 2:
             return tuple(self.element(field.type, index) for index, field in enumerate(named.fields))
-        return {field.name: self.member(field.type, field.name) for field in named.fields}
+        return {field.name: self.field(field.type, field.name) for field in named.fields}
 
     def struct(self, type: Struct) -> Any:
         members = self.members(type.named)
         return members if type.python is None else made(type.python, **(members or {}))
 
     def map(self, type: Map) -> Any:
-        length = self.length(False)
+        length = self.length(type.is_of_empty)
         if not type.has_words:
             return [self.element(Tuple((type.key, type.value)), index) for index in range(length)]
         entries: dict[Any, Any] = {}
         for index in range(length):
             key = self.element(type.key, index)
-            entries[key] = self.member(type.value, key.name if isinstance(key, Variant) else str(key))
+            try:
+                entries[key] = self.value(type.value)
+            except WalkError as error:
+                raise error.within(key.name if isinstance(key, Variant) else str(key)) from None
         return entries
 
     def enum(self, type: Enum) -> Any:
@@ -186,6 +195,7 @@ class Decoder:
             raise WalkError(f"variant number {index}, but only {counted(len(type.variants), 'variant')} known")
         variant = type.variants[index]
         try:
+            self.count(values_of_name(variant.name))
             payload = self.members(variant)
         except WalkError as error:
             raise error.within(variant.name) from None
@@ -198,6 +208,15 @@ class Decoder:
         if not is_of_empty and claimed > left:
             raise WalkError(f"claims {claimed} elements, but only {counted(left, 'byte')} left")
         return claimed
+
+    def fixed_length(self, type: Array) -> int:
+        """Of an array: its type may say any."""
+        left = len(self.data) - self.at
+        if type.is_of_empty and type.length > self.empty_left:
+            raise WalkError(f"more than {EMPTY_MAX} values that take no bytes")
+        if not type.is_of_empty and type.length > left:
+            raise WalkError(f"{counted(type.length - left, 'byte')} missing")
+        return type.length
 
     def integer(self, signed: bool, bits: int) -> int:
         if bits == 8:

@@ -18,11 +18,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Optional
 
+from .budget import EMPTY_MAX, VALUES_MAX, values_most, values_of_name
 from .kept import Kept
 from .scalars import Lend, Reader, Unread, long_number, nothing, octets, plain_reader
 from .tree import (
-    DEPTH_MAX, EMPTY_MAX, VALUES_MAX, Array, Enum, List, Map, Members, Named, Option, Plain, Struct, Tuple, Type,
-    Variant, float_of, is_byte, is_nullable, unwrapped,
+    DEPTH_MAX, Array, Enum, List, Map, Members, Named, Option, Plain, Struct, Tuple, Type, Variant, float_of, is_byte,
+    is_nullable, unwrapped,
 )  # fmt: skip
 
 
@@ -44,13 +45,13 @@ def reader_of(type: Type) -> Reader | None:
         made = _Maker(None).made(type, 0)
     except Unread:
         return None
-    left = VALUES_MAX - made.values
-    if made.empties > EMPTY_MAX or left < 0:
+    # What a message without bytes may have, each may.
+    if made.empties > EMPTY_MAX or made.values > values_most(0):
         return None
     if made.lists == 1:
         # Not in another one: its length alone says how many there are.
-        return _Maker(left).made(type, 0).read
-    return _counting(made.read, left) if made.lists else made.read
+        return _Maker(made.values).made(type, 0).read
+    return _counting(made.read, made.values) if made.lists else made.read
 
 
 READERS = Kept("reader", reader_of)
@@ -77,12 +78,12 @@ class _Made:
 
 
 class _Maker:
-    """Makes the readers of one type; a part that it has several times has one reader. ``room``: for the values of its
-    one list; none: there are more, and :class:`_Counting` knows."""
+    """Makes the readers of one type; a part that it has several times has one reader. ``beside``: values outside of
+    its one list; none: there are more lists, and :class:`_Counting` knows."""
 
-    def __init__(self, room: int | None) -> None:
+    def __init__(self, beside: int | None) -> None:
         self._known: dict[int, _Made] = {}
-        self._room = room
+        self._beside = beside
 
     def made(self, type: Type, depth: int) -> _Made:
         type = unwrapped(type)
@@ -129,7 +130,7 @@ class _Maker:
         if inner.empties:
             raise Unread
         as_float = float_of(type.element)
-        made = _around(_many(inner, as_float, None, self._room), inner)
+        made = _around(_many(inner, as_float, None, self._beside), inner)
         made.lists = 0 if as_float else 1 + min(inner.lists, 1)
         return made
 
@@ -139,7 +140,7 @@ class _Maker:
         if inners[0].empties or inners[1].empties:
             raise Unread
         each = inners[0].values + inners[1].values + (not type.has_words)
-        made = _together(_map(inners[0].read, inners[1].read, type.has_words, (each, self._room)), inners)
+        made = _together(_map(inners[0].read, inners[1].read, type.has_words, (each, self._beside)), inners)
         made.depth += not type.has_words
         made.values, made.lists = 1, 1 + min(made.lists, 1)
         return made
@@ -156,7 +157,9 @@ class _Maker:
         if named.kind == 0:
             return _Made(nothing if python is None else _made_of_nothing(python), 0, True)
         make = _payload(named) if python is None else called(python, names)
-        return _together(_several([it.part for it in inners], make), inners)
+        made = _together(_several([it.part for it in inners], make), inners)
+        made.values += _names(named)
+        return made
 
     def _enum(self, type: Enum, depth: int) -> _Made:
         variants: list[_Chosen] = []
@@ -168,7 +171,8 @@ class _Maker:
         for variant in type.variants:
             its = self._members(variant, depth) if variant.kind else []
             inners += its
-            most = max(most, sum(it.values for it in its))
+            names = values_of_name(variant.name) + _names(variant)
+            most = max(most, names + sum(it.values for it in its))
             read = its[0].read if variant.kind == 1 else None
             if variant.kind > 1:
                 read = _several([it.part for it in its], _payload(variant))
@@ -177,6 +181,11 @@ class _Maker:
         made = _together(_enum(variants, python), inners)
         made.is_empty, made.values = False, 1 + most
         return made
+
+
+def _names(named: Named) -> int:
+    """Values that the names of fields count as, where values have them."""
+    return sum(values_of_name(field.name) for field in named.fields) if named.kind == 3 else 0
 
 
 def _around(read: Reader, inner: _Made) -> _Made:
@@ -219,8 +228,8 @@ def called(python: Any, names: list[str]) -> Callable[..., Any]:
 # Readers.
 
 
-def _counting(inner: Reader, left: int) -> Reader:
-    return lambda data, at, lend: inner(data, at, _Counting(data, lend, left))
+def _counting(inner: Reader, beside: int) -> Reader:
+    return lambda data, at, lend: inner(data, at, _Counting(data, lend, values_most(len(data)) - beside))
 
 
 def _made_of_nothing(python: Any) -> Reader:
@@ -240,7 +249,7 @@ def _option(inner: Reader, is_marked: bool) -> Reader:
     return read
 
 
-def _claimed(data: Any, at: int, lend: Any, each: int, room: int | None) -> tuple[int, int]:
+def _claimed(data: Any, at: int, lend: Any, each: int, beside: int | None) -> tuple[int, int]:
     """How many elements; each of them takes a byte at least, and is so many values."""
     length = data[at]
     if length < 0x80:
@@ -250,20 +259,21 @@ def _claimed(data: Any, at: int, lend: Any, each: int, room: int | None) -> tupl
     if length > len(data) - at:
         raise Unread
     if each:
-        left = room
-        if left is None:
+        if beside is None:
             left = lend.left
             lend.left -= length * each
+        else:
+            left = values_most(len(data)) - beside
         if length * each > left:
             raise Unread
     return length, at
 
 
-def _many(element: _Made, as_float: str, fixed: int | None, room: int | None) -> Reader:
+def _many(element: _Made, as_float: str, fixed: int | None, beside: int | None) -> Reader:
     size, inner, each = struct.calcsize(as_float), element.read, 0 if as_float else element.values
 
     def read(data: Any, at: int, lend: Lend) -> tuple[Any, int]:
-        length, at = _claimed(data, at, lend, each, room) if fixed is None else (fixed, at)
+        length, at = _claimed(data, at, lend, each, beside) if fixed is None else (fixed, at)
         if as_float:
             end = at + length * size
             if end > len(data):

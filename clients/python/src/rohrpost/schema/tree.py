@@ -11,11 +11,6 @@ DEPTH_MAX = 128
 """Descriptions and values nest no deeper than this."""
 TYPES_MAX = 16_384
 """Types and fields in one description."""
-EMPTY_MAX = 65_536
-"""Values that take no bytes, in one message."""
-VALUES_MAX = 1_000_000
-"""Values in one message that are objects of their own here, of some 100 bytes each: lists, structs and all that is in
-them, but for the contents of ``bytes`` and texts, and for numbers in a list of f32 or f64."""
 
 NAMES = (
     "unit", "bool", "u8", "u16", "u32", "u64", "u128", "i8", "i16", "i32", "i64", "i128", "f32", "f64", "char",
@@ -81,6 +76,11 @@ class Array(_Kept):
     length: int
     element: Type
 
+    @cached_property
+    def is_of_empty(self) -> bool:
+        """Whether no element takes any byte."""
+        return is_empty(self.element)
+
 
 @dataclass(frozen=True)
 class Map(_Kept):
@@ -88,6 +88,11 @@ class Map(_Kept):
 
     key: Type
     value: Type
+
+    @cached_property
+    def is_of_empty(self) -> bool:
+        """Whether no pair takes any byte."""
+        return is_empty(self.key) and is_empty(self.value)
 
     @cached_property
     def has_words(self) -> bool:
