@@ -158,7 +158,7 @@ mod tests {
             item: "scan".into(),
             ty,
             message_encoding: encoding.into(),
-            schema_encoding: String::new(),
+            schema_encoding: Default::default(),
             texts: BTreeMap::new(),
         }
     }

@@ -14,6 +14,8 @@
 //! Both descriptions and bytes come from other processes, so nothing here trusts them: no input panics, nesting ends at
 //! [`DEPTH_MAX`], and a claimed length is compared with the bytes that are left before anything is allocated for it.
 //!
+//! Texts of others are shown as [`plain`] writes them.
+//!
 //! What encodes and decodes again is the same, with one exception: which of the many NaNs an `f32` was may change.
 //!
 //! Knows no mailbox and no module.
@@ -32,6 +34,7 @@ mod description;
 mod encode;
 mod error;
 mod json;
+pub mod plain;
 mod quantities;
 mod scalar;
 mod serial;
