@@ -209,9 +209,9 @@ fn contradiction(text: &str, recorded: &BTreeSet<String>) -> String {
         line.map_or("ends there".to_owned(), |line| format!("has `{line}`"))
     };
     format!(
-        "the configuration in its journal is not the one that the recording says it was made with (`rohrpost record info \
-         --json`): in line {} the journal {}, and the recording {}. Either the file was altered, or the configuration \
-         was while it was recorded",
+        "the configuration in its journal is not the one that the recording says it was made with (`rohrpost record \
+         info --json`): in line {} the journal {}, and the recording {}. Either the file was altered, or the \
+         configuration was while it was recorded",
         at + 1,
         line(text),
         line(nearest)

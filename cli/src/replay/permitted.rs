@@ -1,5 +1,5 @@
-//! What a recorded configuration does not decide by itself, since somebody else may have written it: which command runs,
-//! where a recorder writes and listens, and where the GUI draws.
+//! What a recorded configuration does not decide by itself, since somebody else may have written it: which command
+//! runs, where a recorder writes and listens, and where the GUI draws.
 
 use super::tables::text_of;
 use crate::command_line::command_line;
