@@ -1,4 +1,4 @@
-//! What a recording would have run, in words, for the person who decides: the command of a module, and what of it is
+//! What a recording would have run, in words, before the user decides: the command of a module, and what of it is
 //! otherwise in the local configuration. Nothing runs here.
 
 use super::command::ModuleCommand;

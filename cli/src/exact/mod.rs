@@ -6,7 +6,7 @@
 //!          └──▶ records that these name, in another file ───────────────────┘
 //! ```
 //!
-//! A recording names programs, and whoever wrote it may have named any. So nothing runs until the user has named the
+//! A recording names programs, and anybody may have written it. So nothing runs until the user has named the
 //! program, or has said that the recorded ones are to run; until then `consent` says which those are.
 
 mod answers;

@@ -81,7 +81,7 @@ pub(crate) struct Arguments {
     /// the recorded one, programs and the recorder need --run-recorded, too.
     #[arg(long, value_name = "NAME")]
     run: Vec<String>,
-    /// Run the commands that are recorded, as you: with --run and with --exact. Whoever wrote the file chose them.
+    /// Run the commands that are recorded, as you: with --run and with --exact. Anybody may have written them.
     #[arg(long, requires = "runs", conflicts_with_all = ["config", "program", "list"])]
     run_recorded: bool,
     /// Names (laser.0) or topics (laser.0/scan) to play; all, if none is named.
