@@ -14,6 +14,7 @@ mod call;
 mod carried;
 mod check;
 mod clean;
+mod command_line;
 mod completions;
 mod control;
 mod daemons;

@@ -56,7 +56,7 @@ flush = "20 ms"
 
 const BUILDING: &str = include_str!("../../config/building.map");
 
-fn launched(place: &Place, modules: &str) -> (Running, Robot) {
+pub(crate) fn launched(place: &Place, modules: &str) -> (Running, Robot) {
     let config = place.config(&[RECORDED_CLASSES, LOGD, modules]);
     std::fs::write(place.path("building.map"), BUILDING).unwrap();
     std::fs::write(place.path("vision.map"), "far").unwrap();
@@ -92,7 +92,8 @@ pub(crate) fn replayed(place: &Place, file: &Path, modules: &[&str]) -> Vec<Valu
 }
 
 fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str)]) -> Said {
-    let mut command = place.command(&[&["replay", "--exact", "--json", file.to_str().unwrap()], modules].concat());
+    let words = ["replay", "--exact", "--run-recorded", "--json", file.to_str().unwrap()];
+    let mut command = place.command(&[&words, modules].concat());
     command.envs(variables.iter().copied());
     Running::start(command).said()
 }
@@ -181,7 +182,7 @@ fn simulator_pilot_and_mapper_of_a_loaded_and_disturbed_run_repeat_exactly() {
             assert!(run["events"].as_u64() > Some(10) && run["outputs"].as_u64() > Some(5), "{run:#}");
         }
     }
-    let text = place.say(&["replay", "--exact", file.to_str().unwrap(), "mapper.0"]).ok();
+    let text = place.say(&["replay", "--exact", "--run-recorded", file.to_str().unwrap(), "mapper.0"]).ok();
     assert!(text.starts_with("mapper.0: identical: "), "{text}");
     let listed = place.say(&["replay", "--exact", file.to_str().unwrap(), "mapper.0", "--list"]).ok();
     let events = text.split_whitespace().nth(2).unwrap();
@@ -225,8 +226,8 @@ fn rules_that_are_kept_repeat_and_those_that_are_broken_are_found_or_refused() {
     let other = place.path("other");
     std::fs::create_dir(&other).unwrap();
     std::fs::write(other.join("vision.map"), "far").unwrap();
-    let command = ["replay", "--exact", file.to_str().unwrap(), "seer.3", "--folder", other.to_str().unwrap()];
-    let text = place.say(&command).ok();
+    let command = ["replay", "--exact", "--run-recorded", file.to_str().unwrap(), "seer.3", "--folder"];
+    let text = place.say(&[&command[..], &[other.to_str().unwrap()]].concat()).ok();
     assert!(text.starts_with("seer.3: identical: "), "{text}");
 }
 

@@ -13,7 +13,7 @@ use rohrpost::{Context, Fault, Module, ModuleError};
 use std::time::Duration;
 
 /// One character of each kind that a terminal interprets, and the beginning of a line that imitates a tool's own.
-const HOSTILE: &str =
+pub(crate) const HOSTILE: &str =
     "x\u{1b}[2J\u{1b}]0;title\u{7}\r\u{9b}31m\u{90}\u{202e}\u{2066}\u{200f}\u{2028}\u{8}\u{7f}\nFORGED: all is well\n";
 /// Functions with failures and results.
 const FAILS: u16 = 16;
@@ -30,7 +30,7 @@ fn module() {
 }
 
 /// A type with only hostile names.
-fn structure(inner: Type) -> Type {
+pub(crate) fn structure(inner: Type) -> Type {
     let field = Field::new(HOSTILE, inner).said(HOSTILE, HOSTILE);
     Type::Struct(Named::new(HOSTILE, Members::Fields(vec![field])).said(HOSTILE))
 }
@@ -147,7 +147,7 @@ impl Module for Hostile {
 
 /// No terminal control characters except the tool's own line ends and tabs; and no line that starts with foreign text.
 #[track_caller]
-fn assert_plain(what: &[&str], text: &str) {
+pub(crate) fn assert_plain(what: &[&str], text: &str) {
     let obeyed: Vec<char> = text.chars().filter(|c| is_obeyed(*c) && !matches!(c, '\n' | '\t')).collect();
     assert!(obeyed.is_empty(), "{what:?} prints {obeyed:?}: {text:?}");
     assert!(!text.lines().any(|line| line.starts_with("FORGED")), "{what:?} lets others begin a line: {text}");

@@ -16,6 +16,7 @@ mod c_modules;
 mod check;
 mod completions;
 mod conforming;
+mod consent;
 mod control;
 mod crash;
 mod demo;

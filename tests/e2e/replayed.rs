@@ -132,7 +132,7 @@ fn values(file: &Path) -> BTreeMap<String, Vec<Recorded>> {
     while let Some((channel, message)) = reader.next().unwrap() {
         let Message { stamp_ns, epoch, data, .. } = message;
         let value = Recorded { stamp_ns, epoch, bytes: data.to_vec() };
-        values.entry(channel.topic.clone()).or_default().push(value);
+        values.entry(channel.topic.to_string()).or_default().push(value);
     }
     values
 }
@@ -190,7 +190,10 @@ fn replaying(place: &Place, replay: &mut Running) -> Robot {
 fn what_is_replayed_and_recorded_again_is_the_same_and_a_fresh_mapper_draws_the_same_map() {
     let place = Place::new();
     let first = record(&place);
-    let mut replay = replay(&place, &first, &["--run", "mapper.0", "--run", "logd.0", "--rate", "5", "--paused"]);
+    let told = place.say(&["replay", first.to_str().unwrap(), "--run", "logd.0"]).fails();
+    assert!(told.contains("it would write files into\n  ") && told.contains("add --run-recorded to let it"), "{told}");
+    let words = ["--run", "mapper.0", "--run", "logd.0", "--run-recorded", "--rate", "5", "--paused"];
+    let mut replay = replay(&place, &first, &words);
     let robot = replaying(&place, &mut replay);
     wait("all listen", || {
         replay.assert_runs();

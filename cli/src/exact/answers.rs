@@ -5,6 +5,7 @@ use crate::terminal::{Failure, complain};
 use rohrpost_config::{Installation, Module};
 use rohrpost_mailbox::Name;
 use rohrpost_modules::journal::NotedAnswer;
+use rohrpost_recording::Info;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -27,7 +28,7 @@ impl JournalAnswers {
     /// Of these modules of an installation, in files that follow one another. Their journals are put together in a
     /// folder of their own within this one, and removed.
     pub(crate) fn read(
-        files: &[&Path],
+        files: &[Info],
         (installation, modules): (&Installation, &[String]),
         folder: &Path,
     ) -> Result<Self, Failure> {
@@ -78,7 +79,7 @@ mod tests {
     use super::*;
     use rohrpost::schema::Type;
     use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, Piece};
-    use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+    use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer, info};
 
     const CONFIG: &str = r#"
 installation = "test"
@@ -120,8 +121,8 @@ program = "motor"
         ] {
             let folder = tempfile::tempdir().unwrap();
             recorded(folder.path(), module, offset);
-            let file = folder.path().join("base-0001.mcap");
-            let read = JournalAnswers::read(&[&file], (&installation, &[]), folder.path()).unwrap();
+            let file = info(&folder.path().join("base-0001.mcap")).unwrap();
+            let read = JournalAnswers::read(&[file], (&installation, &[]), folder.path()).unwrap();
             assert!(read.names.is_empty() && read.answers.is_empty());
             assert!(read.unreadable.keys().eq(names), "{:?}", read.unreadable);
             assert!(read.unreadable.values().all(|told| told.contains(why)), "{:?}", read.unreadable);

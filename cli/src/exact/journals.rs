@@ -7,13 +7,17 @@ use rohrpost::output::plain;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::Name;
 use rohrpost_modules::journal::{ExactRun, JOURNAL_NAME, JOURNAL_NUMBER, Piece};
-use rohrpost_recording::{Reader, RecordedChannel};
+use rohrpost_recording::{Info, Reader, RecordedChannel, info};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 /// Runs in one recording.
 const RUNS_MAX: usize = 10_000;
+/// Of a line of a configuration in a message.
+const LINE_CHARS_MAX: usize = 200;
 
 /// The journal of one run of a module: from its start to its end, or as far as it was recorded.
 #[derive(Debug)]
@@ -28,6 +32,8 @@ pub(super) struct RecordedRun {
     pub(super) ends: Option<String>,
     /// Why it cannot be replayed at all: its beginning is missing.
     pub(super) begins_late: Option<String>,
+    /// Configurations that the recording says it was made with.
+    configurations: Rc<BTreeSet<String>>,
 }
 
 /// Runs that are being put together.
@@ -35,6 +41,7 @@ struct PiecedRuns<'a> {
     runs: Vec<RecordedRun>,
     folder: &'a Path,
     quota: &'a mut UnpackedQuota,
+    configurations: Rc<BTreeSet<String>>,
     /// The file of the run to which a piece was added last.
     open: Option<(usize, File)>,
 }
@@ -46,7 +53,7 @@ pub(super) fn read(
     folder: &Path,
     quota: &mut UnpackedQuota,
 ) -> Result<Vec<RecordedRun>, Failure> {
-    let mut pieced = PiecedRuns::new(folder, quota);
+    let mut pieced = PiecedRuns::new(folder, quota, configurations(&[info(file)?]));
     let mut reader = Reader::open(file)?;
     let mut damage = None;
     loop {
@@ -79,11 +86,13 @@ pub(super) fn read(
 }
 
 /// Those of these modules in files that follow one another, as far as they are whole.
-pub(super) fn of_files(files: &[&Path], modules: &[String], folder: &Path) -> Result<Vec<RecordedRun>, Failure> {
-    let mut quota = UnpackedQuota::of_files(files);
-    let (mut pieced, mut progress) = (PiecedRuns::new(folder, &mut quota), ProgressLine::new());
+pub(super) fn of_files(files: &[Info], modules: &[String], folder: &Path) -> Result<Vec<RecordedRun>, Failure> {
+    let paths: Vec<&Path> = files.iter().map(|file| file.path.as_path()).collect();
+    let mut quota = UnpackedQuota::of_files(&paths);
+    let mut pieced = PiecedRuns::new(folder, &mut quota, configurations(files));
+    let mut progress = ProgressLine::new();
     for file in files {
-        let mut reader = Reader::open(file)?;
+        let mut reader = Reader::open(&file.path)?;
         loop {
             match reader.next() {
                 Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
@@ -100,15 +109,20 @@ pub(super) fn of_files(files: &[&Path], modules: &[String], folder: &Path) -> Re
     Ok(pieced.runs)
 }
 
+/// What the files say of themselves.
+fn configurations(files: &[Info]) -> Rc<BTreeSet<String>> {
+    files.iter().flat_map(Info::configurations).map(|(_, text)| text.to_owned()).collect::<BTreeSet<_>>().into()
+}
+
 fn is_wanted(channel: &RecordedChannel, modules: &[String]) -> bool {
     let is_journal = channel.item == JOURNAL_NAME
         && channel.texts.get("number").is_some_and(|number| *number == JOURNAL_NUMBER.to_string());
-    is_journal && (modules.is_empty() || modules.contains(&channel.name))
+    is_journal && (modules.is_empty() || modules.iter().any(|module| channel.name == *module))
 }
 
 impl<'a> PiecedRuns<'a> {
-    fn new(folder: &'a Path, quota: &'a mut UnpackedQuota) -> Self {
-        Self { runs: Vec::new(), folder, quota, open: None }
+    fn new(folder: &'a Path, quota: &'a mut UnpackedQuota, configurations: Rc<BTreeSet<String>>) -> Self {
+        Self { runs: Vec::new(), folder, quota, configurations, open: None }
     }
 
     fn take(&mut self, channel: &RecordedChannel, value: &[u8]) -> Result<(), Failure> {
@@ -150,7 +164,8 @@ impl<'a> PiecedRuns<'a> {
             )
         });
         let (module, journal) = (module.to_owned(), self.folder.join(format!("journal-{at}")));
-        self.runs.push(RecordedRun { module, incarnation, journal, len: 0, ends: None, begins_late });
+        let configurations = self.configurations.clone();
+        self.runs.push(RecordedRun { module, incarnation, journal, len: 0, ends: None, begins_late, configurations });
         Ok(at)
     }
 
@@ -180,15 +195,38 @@ impl RecordedRun {
         self.begins_late.clone().map_or_else(|| self.installation(exact), Err)
     }
 
-    /// The configuration as it was then, and the module: that of the channel.
+    /// The configuration as it was then, and the module: that of the channel. The journal has it from the module, the
+    /// recording from its recorder; a journal with another one than its recording was not written in that run.
     pub(super) fn installation(&self, exact: &ExactRun) -> Result<(Installation, Name), String> {
         let (installation, name) = exact.installation().map_err(|error| error.to_string())?;
+        if !self.configurations.is_empty() && !self.configurations.contains(&installation.text) {
+            return Err(contradiction(&installation.text, &self.configurations));
+        }
         let named = installation.classes.format(name);
         if named != self.module {
             return Err(format!("the journal that was recorded of {} is of another module: {named}", self.module));
         }
         Ok((installation, name))
     }
+}
+
+/// Where a journal's configuration is another one than those of the recording.
+fn contradiction(text: &str, recorded: &BTreeSet<String>) -> String {
+    let alike = |other: &str| text.lines().zip(other.lines()).take_while(|(one, other)| one == other).count();
+    let nearest = recorded.iter().max_by_key(|other| alike(other)).map_or("", String::as_str);
+    let at = alike(nearest);
+    let line = |text: &str| {
+        let line = text.lines().nth(at).map(|line| line.chars().take(LINE_CHARS_MAX).collect::<String>());
+        line.map_or("ends there".to_owned(), |line| format!("has `{line}`"))
+    };
+    format!(
+        "the configuration in its journal is not the one that the recording says it was made with (`rohrpost record \
+         info --json`): in line {} the journal {}, and the recording {}. Either the file was altered, or the \
+         configuration was while it was recorded",
+        at + 1,
+        line(text),
+        line(nearest)
+    )
 }
 
 fn no_journal(file: &Path, module: Option<&String>) -> Failure {
@@ -216,12 +254,12 @@ mod tests {
     fn channel(module: &str, is_repeated: bool) -> RecordedChannel {
         let texts = is_repeated.then(|| ("repeated".to_owned(), String::new()));
         RecordedChannel {
-            topic: format!("{module}/{JOURNAL_NAME}"),
-            name: module.to_owned(),
-            item: JOURNAL_NAME.to_owned(),
+            topic: format!("{module}/{JOURNAL_NAME}").into(),
+            name: module.into(),
+            item: JOURNAL_NAME.into(),
             ty: None,
-            message_encoding: String::new(),
-            schema_encoding: String::new(),
+            message_encoding: Default::default(),
+            schema_encoding: Default::default(),
             texts: texts.into_iter().collect(),
         }
     }
@@ -230,7 +268,7 @@ mod tests {
     fn a_run_begins_at_nothing_unless_the_file_repeats_it() {
         let folder = tempfile::tempdir().unwrap();
         let mut quota = UnpackedQuota::new(1 << 20);
-        let mut pieced = PiecedRuns::new(folder.path(), &mut quota);
+        let mut pieced = PiecedRuns::new(folder.path(), &mut quota, Rc::default());
         for (is_repeated, offset, bytes) in [
             (false, 7, &b"late"[..]),
             (false, 0, b"a"),
@@ -249,10 +287,26 @@ mod tests {
     }
 
     #[test]
+    fn a_configuration_that_is_not_the_recorded_one_is_told_by_its_first_other_line() {
+        let recorded = ["[\"pilot.0\"]\nspeed = 1\n", "a = 1\nprogram = \"pilot\"\n"];
+        let recorded = recorded.map(str::to_owned).into();
+        for (text, told) in [
+            (
+                "a = 1\nprogram = \"sh\"\n",
+                "in line 2 the journal has `program = \"sh\"`, and the recording has `program = \"pilot\"`",
+            ),
+            ("a = 1\nprogram = \"pilot\"\nb = 2\n", "in line 3 the journal has `b = 2`, and the recording ends there"),
+        ] {
+            let said = contradiction(text, &recorded);
+            assert!(said.contains(told), "{said}");
+        }
+    }
+
+    #[test]
     fn too_many_runs_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let mut quota = UnpackedQuota::new(1 << 20);
-        let mut pieced = PiecedRuns::new(folder.path(), &mut quota);
+        let mut pieced = PiecedRuns::new(folder.path(), &mut quota, Rc::default());
         let channel = channel("pilot.0", false);
         let mut begin = |incarnation| pieced.take(&channel, &record(incarnation, 9, b"late"));
         (0..RUNS_MAX as u32).for_each(|incarnation| begin(incarnation).unwrap());
@@ -263,7 +317,7 @@ mod tests {
     fn a_journal_takes_no_more_disk_than_it_may() {
         let folder = tempfile::tempdir().unwrap();
         let mut quota = UnpackedQuota::new(5);
-        let mut pieced = PiecedRuns::new(folder.path(), &mut quota);
+        let mut pieced = PiecedRuns::new(folder.path(), &mut quota, Rc::default());
         let channel = channel("pilot.0", false);
         pieced.take(&channel, &record(5, 0, b"abc")).unwrap();
         let told = pieced.take(&channel, &record(5, 3, b"def")).unwrap_err().to_string();
@@ -275,7 +329,7 @@ mod tests {
     fn pieces_are_put_together_until_one_is_missing() {
         let folder = tempfile::tempdir().unwrap();
         let mut quota = UnpackedQuota::new(1 << 20);
-        let mut pieced = PiecedRuns::new(folder.path(), &mut quota);
+        let mut pieced = PiecedRuns::new(folder.path(), &mut quota, Rc::default());
         for (module, incarnation, offset, bytes) in [
             ("pilot.0", 5, 0, &b"ab"[..]),
             ("mapper.0", 6, 9, b"x"),

@@ -5,23 +5,30 @@
 //! recording ──▶ journals: pieces of each run put together, a file each ──▶ the module's program, alone ──▶ its report
 //!          └──▶ records that these name, in another file ───────────────────┘
 //! ```
+//!
+//! A recording names programs, and anybody may have written it. So nothing runs until the user has named the
+//! program, or has said that the recorded ones are to run; until then `consent` says which those are.
 
 mod answers;
+mod command;
+mod consent;
 mod journals;
 mod program;
 mod records;
 
+use crate::command_line::command_line;
 use crate::demo::Folder;
 use crate::quota::UnpackedQuota;
 use crate::terminal::{Failure, complain, say};
 pub(super) use answers::JournalAnswers;
+use consent::LocalConfiguration;
 use journals::RecordedRun;
 use program::ExactPrograms;
-pub(super) use program::SHARED_MEMORY;
+pub(super) use program::{ExactProgram, SHARED_MEMORY};
 use rohrpost::output::plain;
-use rohrpost_modules::journal::{Difference, ReplayReport, ReplayVerdict};
+use rohrpost_modules::journal::{Difference, ExactRun, ReplayReport, ReplayVerdict};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -31,8 +38,10 @@ pub(super) struct ExactArguments {
     pub(super) file: PathBuf,
     /// Modules; none: all with a journal.
     pub(super) modules: Vec<String>,
-    /// In place of the program that the configuration names.
-    pub(super) program: Option<PathBuf>,
+    /// What runs; none: nothing, and what the recording would run is shown.
+    pub(super) program: Option<ExactProgram>,
+    /// The user's own configuration, with which recorded commands are compared as they are shown.
+    pub(super) config: Option<PathBuf>,
     /// Where relative paths of the configuration start; none: where they did.
     pub(super) folder: Option<PathBuf>,
     /// Print the journals instead, entry by entry.
@@ -42,18 +51,24 @@ pub(super) struct ExactArguments {
 }
 
 pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
-    let folder = Folder::new()?;
-    let file = arguments.file.as_path();
-    let mut quota = UnpackedQuota::of_files(&[file]);
-    let runs = journals::read(file, &arguments.modules, folder.path(), &mut quota)?;
+    let own = Folder::new()?;
+    let mut quota = UnpackedQuota::of_files(&[&arguments.file]);
+    let runs = journals::read(&arguments.file, &arguments.modules, own.path(), &mut quota)?;
     if arguments.list {
         runs.iter().try_for_each(list)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let records = records::collect(file, &runs, folder.path(), &mut quota)?;
-    let programs = ExactPrograms::new(arguments.program.clone(), arguments.folder.clone(), records);
+    let folder = arguments.folder.as_deref().map(canonical).transpose()?;
+    let Some(program) = &arguments.program else {
+        show(arguments, &runs, folder.as_deref())?;
+        complain(advice(arguments));
+        return Ok(ExitCode::FAILURE);
+    };
+    let records = records::collect(&arguments.file, &runs, own.path(), &mut quota)?;
+    let records = records.map(|path| path.display().to_string());
+    let programs = ExactPrograms { program, folder, records };
     let mut code = ExitCode::SUCCESS;
-    for run in &runs {
+    for (number, run) in numbered(&runs) {
         let began = Instant::now();
         let report = match &run.begins_late {
             Some(why) => ReplayReport::refused(why.clone()),
@@ -62,10 +77,76 @@ pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
         if !matches!(report.verdict, ReplayVerdict::Identical { .. }) {
             code = ExitCode::FAILURE;
         }
-        let number = runs.iter().take_while(|other| !std::ptr::eq(*other, run)).filter(|o| o.module == run.module);
-        tell(arguments.json, run, number.count() + 1, &report, began.elapsed());
+        tell(arguments.json, run, number, &report, began.elapsed());
     }
     Ok(code)
+}
+
+fn canonical(folder: &Path) -> Result<String, Failure> {
+    let found = folder.canonicalize().map_err(|error| format!("--folder {}: {error}", folder.display()))?;
+    Ok(found.display().to_string())
+}
+
+/// Each run with its number among those of its module, from 1 on.
+fn numbered(runs: &[RecordedRun]) -> impl Iterator<Item = (usize, &RecordedRun)> {
+    let number = move |at: usize| runs[..=at].iter().filter(|run| run.module == runs[at].module).count();
+    runs.iter().enumerate().map(move |(at, run)| (number(at), run))
+}
+
+/// Says what each run would have run. Runs of one module mostly say the same, which is said once.
+fn show(arguments: &ExactArguments, runs: &[RecordedRun], folder: Option<&str>) -> Result<(), Failure> {
+    let local = LocalConfiguration::load(arguments.config.as_deref())?;
+    let mut shown: Vec<String> = Vec::new();
+    for (number, run) in numbered(runs) {
+        let exact = ExactRun { folder: folder.map(str::to_owned), ..run.exact() };
+        let compared = local.compared(run, &exact);
+        let text = if arguments.json {
+            let (command, differences, why) = match &compared {
+                Ok(its) => {
+                    let words = its.command.words().map(|word| word.to_string_lossy().into_owned());
+                    (json!(words.collect::<Vec<_>>()), json!(its.differences), Value::Null)
+                }
+                Err(why) => (Value::Null, Value::Null, json!(why)),
+            };
+            json!({
+                "module": run.module, "run": number, "result": "not run", "command": command,
+                "differences": differences, "why": why,
+            })
+            .to_string()
+        } else {
+            let name = plain::line(&run.module);
+            match &compared {
+                Ok(its) => {
+                    let notes = its.differences.iter().map(|note| format!("\n    {}", plain::line(note)));
+                    format!("{name}: the recording would run\n  {}{}", its.command, notes.collect::<String>())
+                }
+                Err(why) => format!("{name}: refused: {}", plain::line(why)),
+            }
+        };
+        if !shown.contains(&text) {
+            say(&text);
+            shown.push(text);
+        }
+    }
+    Ok(())
+}
+
+/// Why nothing was run, and how one has it run.
+fn advice(arguments: &ExactArguments) -> String {
+    let mut rest = vec![arguments.file.as_os_str()];
+    rest.extend(arguments.modules.iter().map(std::ffi::OsStr::new));
+    if let Some(folder) = &arguments.folder {
+        rest.extend([std::ffi::OsStr::new("--folder"), folder.as_os_str()]);
+    }
+    if arguments.json {
+        rest.push("--json".as_ref());
+    }
+    let rest = command_line(rest);
+    format!(
+        "nothing was run: a recording can name any command. To run these commands, as you:\n  rohrpost replay --exact \
+         --run-recorded {rest}\nTo run a program of your own instead:\n  rohrpost replay --exact {rest} --program PATH \
+         [-- ARGUMENT...]"
+    )
 }
 
 fn list(run: &RecordedRun) -> Result<(), Failure> {

@@ -1,37 +1,42 @@
 //! The program of a module, run with a journal and nothing else.
 
+use super::command::ModuleCommand;
 use super::journals::RecordedRun;
 use crate::demo::{Folder, is_built_in, write_map};
 use crate::quota::check_shared;
 use crate::terminal::Failure;
-use rohrpost_config::{Program, find_program};
 use rohrpost_modules::journal::{ExactRun, ReplayReport, VARIABLE};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Where shared memory is; a program that runs alone has its mailboxes and streams there, too.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
-/// Runs programs of recorded modules.
-pub(super) struct ExactPrograms {
-    program: Option<PathBuf>,
-    folder: Option<PathBuf>,
-    /// File with the records that journals name.
-    records: Option<String>,
+/// Which program repeats the runs.
+pub(crate) enum ExactProgram {
+    /// This command of the user's, whole: no word of it is the recording's.
+    Given { program: PathBuf, arguments: Vec<OsString> },
+    /// That of the recording, for which the user asked.
+    Recorded,
 }
 
-impl ExactPrograms {
-    pub(super) fn new(program: Option<PathBuf>, folder: Option<PathBuf>, records: Option<PathBuf>) -> Self {
-        Self { program, folder, records: records.map(|path| path.display().to_string()) }
-    }
+/// Runs programs of recorded modules.
+pub(super) struct ExactPrograms<'a> {
+    pub(super) program: &'a ExactProgram,
+    /// What stands for the folder of the configuration.
+    pub(super) folder: Option<String>,
+    /// File with the records that journals name.
+    pub(super) records: Option<String>,
+}
 
+impl ExactPrograms<'_> {
     /// Repeats a run, and reads what the program found.
     pub(super) fn repeat(&self, run: &RecordedRun) -> Result<ReplayReport, Failure> {
         let directory = Folder::within(Path::new(SHARED_MEMORY))?;
         let (file, report) = (directory.path().join("run"), directory.path().join("report"));
-        let folder = self.folder.as_ref().map(|folder| canonical(folder)).transpose()?;
         let mut exact = ExactRun {
-            folder: folder.map(|folder| folder.display().to_string()),
+            folder: self.folder.clone(),
             report: report.display().to_string(),
             records: self.records.clone(),
             ..run.exact()
@@ -57,41 +62,22 @@ impl ExactPrograms {
     }
 
     fn command(&self, run: &RecordedRun, exact: &ExactRun) -> Result<Command, String> {
+        // With a program of the user's, too, only a journal that is what it seems is repeated.
         let (installation, name) = run.installation(exact)?;
-        let own = std::env::current_exe().map_err(|error| error.to_string())?;
         let module = installation.module(name).ok_or("the configuration does not have the module")?;
         check_shared(module.memory()).map_err(|error| error.to_string())?;
-        let command = match (&self.program, &module.program) {
-            (Some(program), Program::Command(words)) => {
+        match self.program {
+            ExactProgram::Given { program, arguments } => {
                 let mut command = Command::new(program);
-                command.args(words.get(1..).unwrap_or_default());
-                command
+                command.args(arguments);
+                Ok(command)
             }
-            (program, Program::Builtin(builtin)) => {
-                let mut command = Command::new(program.as_ref().unwrap_or(&own));
-                command.args(["run", builtin]);
-                command
-            }
-            (None, Program::Command(words)) => {
-                let wanted = words.first().map_or("", String::as_str);
-                let beside = own.parent().unwrap_or(Path::new("."));
-                let found = find_program(wanted, &installation.folder, beside);
-                let found =
-                    found.ok_or_else(|| format!("its program `{wanted}` is not here; name one: --program PATH"))?;
-                let mut command = Command::new(found);
-                command.args(words.get(1..).unwrap_or_default());
-                command
-            }
-        };
-        Ok(command)
+            ExactProgram::Recorded => ModuleCommand::of(&installation, name)?.prepared(),
+        }
     }
 }
 
 /// Whether the folder of the configuration was the copy that a demo made of its own, and removed at its end.
 fn is_of_demo(exact: &ExactRun) -> bool {
     exact.installation().is_ok_and(|(installation, _)| is_built_in(&installation.text) && !installation.folder.exists())
-}
-
-fn canonical(folder: &Path) -> Result<PathBuf, Failure> {
-    Ok(folder.canonicalize().map_err(|error| format!("--folder {}: {error}", folder.display()))?)
 }

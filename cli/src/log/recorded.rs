@@ -156,7 +156,7 @@ impl LineSource {
         let lines: Vec<&ChannelInfo> = info.channels.iter().filter(|channel| has_lines(channel)).collect();
         Self {
             path: info.path.clone(),
-            topics: lines.iter().map(|channel| channel.topic.clone()).collect(),
+            topics: lines.iter().map(|channel| channel.topic.as_str().to_owned()).collect(),
             is_closed: info.is_closed,
             reader: None,
             line: None,
@@ -174,7 +174,7 @@ impl LineSource {
         };
         loop {
             let (arrival_ns, line) = match reader.next() {
-                Ok(Some((channel, message))) if self.topics.contains(&channel.topic) => {
+                Ok(Some((channel, message))) if self.topics.iter().any(|topic| channel.topic == *topic) => {
                     (message.arrival_ns, from_bytes::<OutputLine>(message.data))
                 }
                 Ok(Some(_)) => continue,

@@ -89,7 +89,7 @@ impl Logd {
             return Err(ControlAnswer::err(&"there is no time yet: the log that is played has not begun"));
         }
         let now = self.clock.now();
-        let mark = Mark { time_ns: now.ns, epoch: now.epoch, text };
+        let mark = Mark { time_ns: now.ns, epoch: now.epoch, text: text.into() };
         open(self.present_writer()?.mark(mark), |pending| OpenOrder::Marked(pending, now.ns))
     }
 

@@ -5,7 +5,7 @@ use super::part::PartArguments;
 use super::progress::ProgressLine;
 use crate::terminal::{Failure, say};
 use crate::units::size;
-use rohrpost::output::plain;
+use rohrpost::output::plain::ForeignText;
 use rohrpost_recording::{DrawOptions, Drawn, Info, Reader, Selection};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -95,16 +95,16 @@ fn drawn_text(to: &Path, told: &Drawn) -> String {
     if let Some(carrier) = &told.carrier {
         lines.push(format!("scans and points without a place of their own are on {carrier}"));
     }
-    let mut left_out = |counts: &BTreeMap<String, u64>, why: &str| {
+    let mut left_out = |counts: &BTreeMap<ForeignText, u64>, why: &str| {
         lines.extend(counts.iter().map(|(topic, count)| format!("{topic}: {count} not drawn: {why}")));
     };
     left_out(&told.not_drawn, "the value contradicts itself, or is nowhere");
     left_out(&told.too_long, "above 64 KiB a file or a path would be there twice; leave out --with-original");
     if !told.without.is_empty() {
-        lines.push(format!("not drawn, as there is no picture of them: {}", told.without.join(", ")));
+        let without: Vec<String> = told.without.iter().map(ForeignText::to_string).collect();
+        lines.push(format!("not drawn, as there is no picture of them: {}", without.join(", ")));
     }
-    // Texts of others would make lines of their own.
-    lines.iter().map(|line| plain::line(line)).collect::<Vec<_>>().join("\n")
+    lines.join("\n")
 }
 
 fn write_json(file: &Path, to: &Path, selection: &Selection) -> Result<ExitCode, Failure> {

@@ -4,10 +4,10 @@ use crate::stream::stamp_text;
 use crate::table::table;
 use crate::terminal::{Failure, complain, say};
 use crate::units::size;
-use rohrpost::output::plain;
+use rohrpost::output::plain::ForeignText;
 use rohrpost::schema::describe_type;
 use rohrpost_recording::format::PROFILE;
-use rohrpost_recording::{ChannelInfo, Damage, Info};
+use rohrpost_recording::{ChannelInfo, Damage, Info, Shown};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -47,7 +47,7 @@ fn text(info: &Info) -> String {
         (true, None) => "closed".into(),
         (false, _) => "not closed: if nothing writes it any more, `rohrpost record recover` makes a whole file".into(),
     };
-    let (path, bytes, chunks) = (info.path.display(), size(info.bytes), info.chunks);
+    let (path, bytes, chunks) = (Shown(info.path.clone()), size(info.bytes), info.chunks);
     let messages = messages_text(info);
     let mut lines = vec![format!("{path}: {messages}, {bytes} in {chunks} chunks, {closed}")];
     if info.lost > 0 {
@@ -57,9 +57,8 @@ fn text(info: &Info) -> String {
         ));
     }
     if info.repeated > 0 {
-        let topics = info.channels.iter().filter(|channel| channel.repeated > 0).map(|channel| channel.topic.as_str());
-        let topics: Vec<&str> = topics.collect();
-        lines.push(format!("it begins with the newest of earlier, which is not counted, of {}", topics.join(", ")));
+        let topics = info.channels.iter().filter(|channel| channel.repeated > 0).map(|channel| &channel.topic);
+        lines.push(format!("it begins with the newest of earlier, which is not counted, of {}", listed(topics)));
     }
     if let (Some(first), Some(last)) = (info.first_ns, info.last_ns) {
         let seconds = last.saturating_sub(first) as f64 / 1e9;
@@ -70,7 +69,7 @@ fn text(info: &Info) -> String {
         lines.push(format!("system time stepped; epochs: {}", epochs.collect::<Vec<_>>().join(", ")));
     }
     if info.profile != PROFILE {
-        let profile = if info.profile.is_empty() { "no profile" } else { &info.profile };
+        let profile = if info.profile.is_empty() { "no profile".into() } else { info.profile.to_string() };
         lines.push(format!("not one of ours: {profile}, written by {}", info.library));
     }
     let session = info.session.iter().map(|(key, text)| format!("{key} {text}"));
@@ -79,8 +78,8 @@ fn text(info: &Info) -> String {
     }
     lines.extend(info.marks.iter().map(|mark| format!("mark at {}: {}", stamp_text(mark.time_ns), mark.text)));
     if !info.described.is_empty() {
-        let names: BTreeSet<&str> = info.described.iter().map(|module| module.name.as_str()).collect();
-        lines.push(format!("described for replay: {}", names.into_iter().collect::<Vec<_>>().join(", ")));
+        let names: BTreeSet<&ForeignText> = info.described.iter().map(|module| &module.name).collect();
+        lines.push(format!("described for replay: {}", listed(names)));
     }
     for (name, texts) in &info.others {
         let texts: Vec<String> = texts.iter().map(|(key, text)| format!("{key} {text}")).collect();
@@ -90,10 +89,8 @@ fn text(info: &Info) -> String {
     lines.extend(more_damages(info.damage_count, &info.damages));
     let rows = info.channels.iter().map(|channel| {
         let rate = rate(channel).map_or(String::new(), |rate| format!("{rate:.1}"));
-        [channel.topic.clone(), channel.messages.to_string(), rate, channel.lost.to_string(), type_text(channel)]
+        [channel.topic.to_string(), channel.messages.to_string(), rate, channel.lost.to_string(), type_text(channel)]
     });
-    // Texts of others would make lines of their own.
-    let lines: Vec<_> = lines.iter().map(|line| plain::line(line)).collect();
     format!("{}\n\n{}", lines.join("\n"), table(["topic", ">messages", ">per s", ">lost", "type"], rows))
 }
 
@@ -101,6 +98,10 @@ fn text(info: &Info) -> String {
 pub(super) fn more_damages(count: u64, listed: &[(u64, Damage)]) -> Option<String> {
     let more = count - listed.len() as u64;
     (more > 0).then(|| format!("and {more} more, {count} in all"))
+}
+
+fn listed<'a>(texts: impl IntoIterator<Item = &'a ForeignText>) -> String {
+    texts.into_iter().map(ForeignText::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// All messages; and how many are drawn of others, if they stand beside those.
@@ -125,9 +126,10 @@ fn type_text(channel: &ChannelInfo) -> String {
     match ty {
         Some(ty) => describe_type(ty),
         None => {
-            let words = [type_name.as_str(), message_encoding, schema_encoding];
-            let mut words: Vec<&str> = words.into_iter().filter(|word| !word.is_empty()).collect();
+            let mut words = vec![type_name, message_encoding, schema_encoding];
+            words.retain(|word| !word.is_empty());
             words.dedup();
+            let words: Vec<String> = words.into_iter().map(ForeignText::to_string).collect();
             let drawn = drawn_of.as_ref().map_or(String::new(), |topic| format!(", drawn of {topic}"));
             let reduced = if *is_reduced { ", reduced to 64 KiB" } else { "" };
             format!("{}{drawn}{reduced}", words.join(" "))
@@ -161,6 +163,7 @@ fn as_json(info: &Info) -> Value {
         "repeated": info.repeated, "lost": info.lost,
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
+        "earlier_configuration": info.earlier_configuration,
         "marks": marks.collect::<Vec<_>>(), "described": described.collect::<Vec<_>>(),
         "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),
         "damage_count": info.damage_count,

@@ -138,7 +138,7 @@ mod tests {
             item: "scan".into(),
             ty: ty.map(Arc::new),
             message_encoding: encoding.into(),
-            schema_encoding: String::new(),
+            schema_encoding: Default::default(),
             texts: BTreeMap::new(),
         }
     }

@@ -76,7 +76,7 @@ impl PlayedChannels {
         message: &Message<'_>,
     ) -> Result<(), ContextError> {
         let epoch = self.epoch_of(message.epoch);
-        let Some(channel) = self.by_topic.get_mut(&recorded.topic) else { return Ok(()) };
+        let Some(channel) = self.by_topic.get_mut(recorded.topic.as_str()) else { return Ok(()) };
         let stamp = Stamp { epoch, ns: stamp_of(message, channel.is_opaque) };
         let mut value = message.data;
         if channel.is_opaque {

@@ -6,6 +6,7 @@
 //!           network, slots, access    ─┘                time: that of the recording
 //! ```
 
+use super::permitted::{ReplayDrawing, is_bridge, permit, without_arguments};
 use super::recorded::RecordedFiles;
 use super::sizes::ItemSizes;
 use super::tables::{entries, stream, table, table_of, text_of};
@@ -16,27 +17,15 @@ use rohrpost::schema::Description;
 use rohrpost_config::{GUI, Installation, Module, Program, RECORDER, REPLAY, StreamSpec};
 use rohrpost_modules::journal::JOURNAL_NAME;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::{Table, Value};
 
 /// The replay's one node.
 pub(super) const NODE: &str = "replay";
-/// The program that shows what a node does.
-const BRIDGE: &str = "rohrpost-gui-bridge";
 /// Built-in modules that tell the node's time themselves.
 const TELLERS: [&str; 2] = ["carmen", REPLAY];
 /// Mailbox sizes that any module has.
 const COMMANDS_MIN: (u16, u32) = (32, 1024);
-
-/// What the GUI is to do.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum ReplayDrawing {
-    Nothing,
-    /// Write this file.
-    File(PathBuf),
-    /// Show it in the viewer.
-    Window,
-}
 
 /// What is wanted.
 pub(super) struct ReplayWish<'a> {
@@ -47,6 +36,9 @@ pub(super) struct ReplayWish<'a> {
     pub(super) recorded: &'a RecordedFiles,
     /// Modules that run.
     pub(super) runs: &'a [String],
+    /// Whether that configuration decides what runs, and where that writes and listens: it is the user's own, or the
+    /// user said so.
+    pub(super) is_own: bool,
     /// Names and topics that are played; none: all.
     pub(super) names: &'a [String],
     pub(super) drawing: ReplayDrawing,
@@ -83,16 +75,15 @@ impl ReplayWish<'_> {
             if matches!(&module.program, Program::Builtin(builtin) if TELLERS.contains(&builtin.as_str())) {
                 return Err(format!("--run {name}: it tells its node the time, as the replay does; play it").into());
             }
+            if !self.is_own {
+                permit(name, module, installation, self.folder)?;
+            }
             running.push(module);
         }
         let gui = installation.classes.id(GUI).filter(|_| self.drawing != ReplayDrawing::Nothing);
         // Others than the own one have to be asked for by `--run`: a recording could name any program.
-        let is_bridge = |module: &&Module| match &module.program {
-            Program::Command(words) => words.first().is_some_and(|first| first == BRIDGE),
-            Program::Builtin(_) => false,
-        };
         let guis = installation.modules.iter().filter(|module| Some(module.name.class()) == gui);
-        running.extend(guis.filter(is_bridge));
+        running.extend(guis.filter(|module| is_bridge(module)));
         // In the order of their start.
         let is_running = |module: &&Module| running.iter().any(|running| running.name == module.name);
         Ok(installation.modules.iter().filter(is_running).collect())
@@ -254,6 +245,10 @@ impl ReplayWish<'_> {
             let is_played = |name: &str| played.described.contains_key(name) && player >= module.name.class().0;
             calls.iter_mut().filter(|call| is_played(&name(call))).for_each(|call| *call = name(call).into());
         }
+        let is_gui = is_bridge(module) || self.installation.classes.name(module.name.class()) == Some(GUI);
+        if is_bridge(module) && !self.is_own {
+            without_arguments(&mut entry);
+        }
         if let Some(program) = entry.get_mut("program") {
             let first = match program {
                 Value::Array(words) => words.first_mut(),
@@ -266,15 +261,10 @@ impl ReplayWish<'_> {
             };
             first.into_iter().for_each(in_folder);
         }
-        let is_gui = self.installation.classes.name(module.name.class()) == Some(GUI);
         if let Some(settings) = entry.get_mut("settings") {
             self.find_paths(settings);
             if let (true, Some(settings)) = (is_gui, settings.as_table_mut()) {
-                match &self.drawing {
-                    ReplayDrawing::File(file) => drop(settings.insert("file".into(), text_of(file))),
-                    ReplayDrawing::Window => drop(settings.insert("viewer".into(), "window".into())),
-                    ReplayDrawing::Nothing => {}
-                }
+                self.drawing.settle(settings, self.is_own);
             }
         }
         entry

@@ -59,6 +59,7 @@ fn made(text: &str, modules: &[(&str, Description)], runs: &[&str], names: &[&st
         folder: folder.path(),
         recorded: &recorded,
         runs: &runs,
+        is_own: true,
         names: &names,
         drawing: ReplayDrawing::Nothing,
         saved: None,
@@ -150,6 +151,7 @@ fn what_cannot_be_played_is_refused_in_words() {
             folder: folder.path(),
             recorded: &recorded,
             runs: &runs,
+            is_own: true,
             names: &names,
             drawing: ReplayDrawing::Nothing,
             saved: None,
@@ -176,6 +178,7 @@ fn paths_in_settings_begin_where_they_did() {
         folder: folder.path(),
         recorded: &recorded,
         runs: &runs,
+        is_own: true,
         names: &[],
         drawing: ReplayDrawing::Nothing,
         saved: None,
@@ -193,4 +196,70 @@ fn paths_in_settings_begin_where_they_did() {
 fn saved_parameters_are_those_of_modules_that_run() {
     let saved = "[\"pilot.0\"]\ncruise-m-s = 0.5\n\n[\"motor.0\"]\nlaser-rate-hz = 5.0\n";
     assert_eq!(saved_of(saved, |name| name == "pilot.0").unwrap().trim(), "[\"pilot.0\"]\ncruise-m-s = 0.5");
+}
+
+/// A recorded configuration, of which these modules are to run; why they do not, or the configuration that is made.
+fn stranger(text: &str, runs: &[&str], is_own: bool, drawing: ReplayDrawing) -> Result<Installation, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = recorded(folder.path(), &demo_modules());
+    let source = Installation::parse(text, Path::new("robot.toml")).unwrap();
+    let runs: Vec<String> = runs.iter().map(|name| (*name).to_owned()).collect();
+    let wish = ReplayWish {
+        installation: &source,
+        folder: Path::new("/work"),
+        recorded: &recorded,
+        runs: &runs,
+        is_own,
+        names: &[],
+        drawing,
+        saved: None,
+    };
+    let played = wish.played().map_err(|error| error.to_string())?;
+    let (text, _) = wish.text(&played, Table::new()).map_err(|error| error.to_string())?;
+    Ok(Installation::parse(&text, Path::new("replay.toml")).unwrap())
+}
+
+#[test]
+fn a_recording_decides_neither_what_runs_nor_where_that_writes_and_listens() {
+    let program = "builtin = \"mapper\"";
+    let text = DEMO.replace(program, "program = [\"/bin/sh\", \"-c\", \"touch 'a b'\\n\"]");
+    let told = stranger(&text, &["mapper.0"], false, ReplayDrawing::Nothing).unwrap_err();
+    for words in ["--run mapper.0: ", r"/bin/sh -c $'touch \'a b\'\n'", "add --run-recorded", "--config FILE"] {
+        assert!(told.contains(words), "no `{words}` in: {told}");
+    }
+    assert!(stranger(&text, &["mapper.0"], true, ReplayDrawing::Nothing).is_ok());
+    assert!(stranger(DEMO, &["mapper.0", "pilot.0", "output.0"], false, ReplayDrawing::Nothing).is_ok());
+
+    let control = "control = \"127.0.0.1:7000\"\n";
+    let text = DEMO.replace("[nodes.main]", "logd = { id = 24 }\n[nodes.main]") + LOGD + control;
+    let told = stranger(&text, &["logd.0"], false, ReplayDrawing::Nothing).unwrap_err();
+    assert!(told.contains("write files into\n  /work/recordings, and listen on 127.0.0.1:7000\n"), "{told}");
+    assert!(stranger(&text, &["logd.0"], true, ReplayDrawing::Nothing).is_ok());
+}
+
+#[test]
+fn a_gui_draws_where_the_command_line_says_and_nowhere_else() {
+    let bridge = "program = \"rohrpost-gui-bridge\"";
+    let text = DEMO.replace(bridge, "program = [\"rohrpost-gui-bridge\", \"--more\"]");
+    let viewer = "viewer = \"rerun+http://192.0.2.1:9876/proxy\"";
+    let text = text.replace("settings = { file = ", &format!("settings = {{ {viewer}, file = "));
+    let settings = |drawing: &ReplayDrawing, runs: &[&str], is_own| {
+        let installation = stranger(&text, runs, is_own, drawing.clone()).unwrap();
+        let name = installation.classes.parse_module("gui.0").unwrap();
+        let Module { settings, program, .. } = installation.module(name).unwrap().clone();
+        (settings, program)
+    };
+    let own = Program::Command(vec!["rohrpost-gui-bridge".into()]);
+    let file = ReplayDrawing::File("/work/drawn.rrd".into());
+    for (drawing, runs, wanted) in [
+        (&file, &[][..], table([("file", "/work/drawn.rrd".into())])),
+        (&file, &["gui.0"], table([("file", "/work/drawn.rrd".into())])),
+        (&ReplayDrawing::Window, &[], table([("viewer", "window".into())])),
+        (&ReplayDrawing::Nothing, &["gui.0"], Table::new()),
+    ] {
+        assert_eq!(settings(drawing, runs, false), (wanted, own.clone()), "{drawing:?}");
+    }
+    let (settings, program) = settings(&file, &[], true);
+    assert_eq!(settings, table([("file", "/work/drawn.rrd".into())]));
+    assert_eq!(program, Program::Command(vec!["rohrpost-gui-bridge".into(), "--more".into()]));
 }

@@ -13,6 +13,7 @@ mod channels;
 mod configuration;
 mod course;
 mod others;
+mod permitted;
 mod player;
 mod recorded;
 mod session;
@@ -22,14 +23,15 @@ mod tables;
 
 use crate::check;
 use crate::demo::{Folder, drawing, drawn, is_built_in, write_map};
-use crate::exact::{self, ExactArguments, JournalAnswers};
+use crate::exact::{self, ExactArguments, ExactProgram, JournalAnswers};
 use crate::launch::end;
 use crate::quota::check_shared;
 use crate::record::PartArguments;
 use crate::speech::Speech;
 use crate::terminal::{Failure, complain, say};
-use configuration::{NODE, PlayedModules, ReplayDrawing, ReplayWish, saved_of};
+use configuration::{NODE, PlayedModules, ReplayWish, saved_of};
 use others::IntoStream;
+use permitted::ReplayDrawing;
 pub(crate) use player::run as play;
 use recorded::RecordedFiles;
 use rohrpost::launch::{Launch, events};
@@ -37,6 +39,7 @@ use rohrpost::output::plain;
 use rohrpost::wire::append;
 use rohrpost_config::Installation;
 use session::ReplaySession;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -53,14 +56,16 @@ const DRAWING: &str = "rohrpost-replay.rrd";
 const RATES: std::ops::RangeInclusive<f64> = 0.001..=player::RATE_MAX;
 
 #[derive(clap::Args)]
+#[command(group = clap::ArgGroup::new("runs").args(["exact", "run"]))]
 #[command(after_help = "Examples:
   rohrpost replay recordings/main-*.mcap                  all that was recorded, at its speed
   rohrpost replay main-0001.mcap --run mapper.0 --rate 5  a fresh mapper draws the map anew
   rohrpost replay main-0001.mcap --from +10s --until +20s --loop
   rohrpost replay main-0001.mcap --names laser.0 odometry.0/odometry --paused
   rohrpost replay rosbag2_0.mcap --into /scan=laser.0/scan /imu=imu.0/raw
-  rohrpost replay --exact main-0001.mcap                  all modules that have a journal there
-  rohrpost replay --exact main-0001.mcap pilot.0 --program target/debug/pilot
+  rohrpost replay --exact main-0001.mcap                  says which programs that would run, and runs none
+  rohrpost replay --exact main-0001.mcap pilot.0 --program target/debug/pilot -- --verbose
+  rohrpost replay --exact main-0001.mcap --run-recorded   all modules that have a journal there, as recorded
 In another terminal, as with any node:
   rohrpost call replay.0 pause          also resume, step, step_by 0.5, seek 12.5
   rohrpost echo replay.0 state
@@ -72,12 +77,16 @@ pub(crate) struct Arguments {
     /// recording, and modules; all that have a journal, if none is named.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Another configuration than the recorded one.
+    /// Another configuration than the recorded one. With --exact it is compared with what would run.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// A module that runs as it was configured, and is not played; can be given several times.
+    /// A module that runs as it was configured, and is not played; can be given several times. If the configuration is
+    /// the recorded one, programs and the recorder need --run-recorded, too.
     #[arg(long, value_name = "NAME")]
     run: Vec<String>,
+    /// Run the commands that are recorded, as you: with --run and with --exact. Anybody may have written them.
+    #[arg(long, requires = "runs", conflicts_with_all = ["config", "program", "list"])]
+    run_recorded: bool,
     /// Names (laser.0) or topics (laser.0/scan) to play; all, if none is named.
     #[arg(long, num_args = 1.., value_name = "NAME")]
     names: Vec<String>,
@@ -114,17 +123,20 @@ pub(crate) struct Arguments {
 struct RepeatArguments {
     /// Run the programs of modules again with what they were called with and told, and compare all that they do.
     #[arg(long, conflicts_with_all = [
-        "config", "run", "names", "into", "from", "until", "rate", "repeats", "paused", "viewer", "no_gui", "quiet",
+        "run", "names", "into", "from", "until", "rate", "repeats", "paused", "viewer", "no_gui", "quiet",
     ])]
     exact: bool,
-    /// With --exact: another build of the module's program.
-    #[arg(long, value_name = "PATH", requires = "exact")]
+    /// With --exact: this program runs, with the arguments behind `--`, and no word of the recording.
+    #[arg(long, value_name = "PATH", requires = "exact", conflicts_with_all = ["config", "list"])]
     program: Option<PathBuf>,
+    /// The arguments of --program.
+    #[arg(last = true, value_name = "ARGUMENT", requires = "program")]
+    arguments: Vec<OsString>,
     /// With --exact: folder that stands for that of the configuration; files that its settings name are there.
     #[arg(long, value_name = "FOLDER", requires = "exact")]
     folder: Option<PathBuf>,
     /// With --exact: print what is in the journals instead, entry by entry.
-    #[arg(long, requires = "exact", conflicts_with = "json")]
+    #[arg(long, requires = "exact", conflicts_with_all = ["json", "config"])]
     list: bool,
     /// With --exact: one JSON object a run of a module.
     #[arg(long, requires = "exact")]
@@ -166,12 +178,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 /// Exact replay.
 fn repeat(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let RepeatArguments { program, folder, list, json, .. } = &arguments.repeated;
+    let RepeatArguments { program, arguments: words, folder, list, json, .. } = &arguments.repeated;
     let (file, modules) = arguments.files.split_first().ok_or("name a recording")?;
     exact::run(&ExactArguments {
         file: file.clone(),
         modules: modules.iter().map(|module| module.display().to_string()).collect(),
-        program: program.clone(),
+        program: match program {
+            Some(program) => Some(ExactProgram::Given { program: program.clone(), arguments: words.clone() }),
+            None => arguments.run_recorded.then_some(ExactProgram::Recorded),
+        },
+        config: arguments.config.clone(),
         folder: folder.clone(),
         list: *list,
         json: *json,
@@ -209,6 +225,7 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         folder: &base,
         recorded,
         runs: &arguments.run,
+        is_own: arguments.config.is_some() || arguments.run_recorded,
         names: &arguments.names,
         drawing,
         saved: saved_text.is_some().then_some(&*saved),
@@ -302,9 +319,8 @@ fn noted_answers(
     if modules.is_empty() {
         return Ok(None);
     }
-    let files: Vec<&Path> = recorded.infos.iter().map(|info| info.path.as_path()).collect();
     let mut bytes = Vec::new();
-    append(&mut bytes, &JournalAnswers::read(&files, (source, &modules), folder)?)?;
+    append(&mut bytes, &JournalAnswers::read(&recorded.infos, (source, &modules), folder)?)?;
     Ok(Some(bytes))
 }
 
@@ -337,7 +353,7 @@ fn settings(
     if part.from_ns.is_some_and(|from_ns| from_ns > recorded.end_ns)
         || part.until_ns.is_some_and(|until_ns| until_ns <= recorded.begin_ns)
     {
-        let seconds = (recorded.end_ns - recorded.begin_ns) as f64 / 1e9;
+        let seconds = recorded.end_ns.saturating_sub(recorded.begin_ns) as f64 / 1e9;
         return Err(format!("nothing lies between --from and --until; the recording lasts {seconds:.1} s").into());
     }
     let ns = |ns: u64| i64::try_from(ns).map(Value::Integer).map_err(|_| format!("{ns} ns is beyond the year 2262"));

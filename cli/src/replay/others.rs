@@ -10,7 +10,7 @@ use super::recorded::RecordedFiles;
 use super::sizes::of_records;
 use crate::record::ProgressLine;
 use crate::terminal::Failure;
-use rohrpost::output::plain::line;
+use rohrpost::output::plain::{ForeignText, line};
 use rohrpost::schema::{DataItem, DataKind, Description, Field, Type};
 use rohrpost_config::Installation;
 use rohrpost_recording::{ChannelInfo, ReadError, Reader};
@@ -136,8 +136,8 @@ fn listed(recorded: &RecordedFiles) -> String {
 /// What others say of a type: its name, and how values and types are written.
 fn type_of(channel: &ChannelInfo) -> String {
     let ChannelInfo { type_name, message_encoding, schema_encoding, .. } = channel;
-    let words = [type_name.as_str(), message_encoding, schema_encoding];
-    let words: Vec<&str> = words.into_iter().filter(|word| !word.is_empty()).collect();
+    let words = [type_name, message_encoding, schema_encoding];
+    let words: Vec<&str> = words.into_iter().filter(|word| !word.is_empty()).map(ForeignText::as_str).collect();
     words.join(" ").chars().take(TYPE_CHARS_MAX).collect()
 }
 

@@ -110,7 +110,7 @@ impl Module for RecordingPlayer {
         let PlayerSettings { files, begin_ns, end_ns, rate, from_ns, until_ns, repeats, .. } = settings;
         let files = files.iter().map(|file| context.installation().resolve(file)).collect();
         let topics = channels.topics();
-        let plays = move |channel: &RecordedChannel| !channel.is_drawn() && topics.contains(&channel.topic);
+        let plays = move |channel: &RecordedChannel| !channel.is_drawn() && topics.contains(channel.topic.as_str());
         let course = Course::new(Player::new(files, plays), Part { from_ns, until_ns, repeats })?;
         let timer = TimerFd::new(ClockId::CLOCK_MONOTONIC, TimerFlags::TFD_NONBLOCK | TimerFlags::TFD_CLOEXEC)?;
         context.watch(&timer, Interest::Read)?;

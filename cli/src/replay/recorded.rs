@@ -1,7 +1,6 @@
 //! What the files of a replay say together: modules, configuration, times.
 
 use crate::terminal::Failure;
-use rohrpost::output::plain::line;
 use rohrpost::schema::Description;
 use rohrpost_modules::journal::JOURNAL_NAME;
 use rohrpost_recording::format::{MESSAGE_ENCODING, PROFILE, session_key};
@@ -62,9 +61,9 @@ impl RecordedFiles {
         for info in &self.infos {
             for DescribedModule { name, description } in info.described.iter().filter(|module| is_wanted(&module.name))
             {
-                let (known, first) = described.entry(name.clone()).or_insert((description.clone(), info));
+                let (known, first) = described.entry(name.as_str().to_owned()).or_insert((description.clone(), info));
                 if known.hash() != description.hash() {
-                    let (name, first, second) = (line(name), first.path.display(), info.path.display());
+                    let (first, second) = (first.path.display(), info.path.display());
                     return Err(format!(
                         "{name} has one interface ({:08x}) in {first} and another ({:08x}) in {second}; replay the \
                          files one by one, or `--names` without it",
@@ -87,15 +86,16 @@ impl RecordedFiles {
     pub(super) fn topics(&self, described: &BTreeMap<String, Description>) -> BTreeSet<String> {
         let channels = || self.infos.iter().flat_map(|info| &info.channels);
         let fits = |channel: &&rohrpost_recording::ChannelInfo| {
-            let item = described.get(&channel.name).and_then(|description| description.data_item(&channel.item));
+            let item =
+                described.get(channel.name.as_str()).and_then(|description| description.data_item(&channel.item));
             let types = item.map(|item| &item.field.ty).zip(channel.ty.as_ref());
             channel.message_encoding == MESSAGE_ENCODING && types.is_some_and(|(one, other)| one.hash() == other.hash())
         };
         let with_messages = || channels().filter(|channel| channel.messages > 0 && channel.drawn_of.is_none());
         let other: BTreeSet<&str> =
             with_messages().filter(|channel| !fits(channel)).map(|channel| channel.topic.as_str()).collect();
-        let topics = with_messages().map(|channel| &channel.topic);
-        topics.filter(|topic| !other.contains(topic.as_str())).cloned().collect()
+        let topics = with_messages().map(|channel| channel.topic.as_str());
+        topics.filter(|topic| !other.contains(topic)).map(str::to_owned).collect()
     }
 
     /// All topics with messages, but for what was drawn of others.
@@ -111,7 +111,7 @@ impl RecordedFiles {
     pub(super) fn with_journal(&self) -> Vec<String> {
         let channels = self.infos.iter().flat_map(|info| &info.channels);
         let journals = channels.filter(|channel| !self.are_others && channel.item == JOURNAL_NAME);
-        let names: BTreeSet<String> = journals.map(|channel| channel.name.clone()).collect();
+        let names: BTreeSet<String> = journals.map(|channel| channel.name.as_str().to_owned()).collect();
         names.into_iter().collect()
     }
 
@@ -119,16 +119,16 @@ impl RecordedFiles {
     pub(super) fn configuration(&self) -> Result<RecordedText, Failure> {
         let is_one = |text: &str| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("installation"));
         let mut found: Option<RecordedText> = None;
-        for (name, text) in self.infos.iter().flat_map(|info| &info.configuration) {
+        for (name, text) in self.infos.iter().flat_map(Info::configurations) {
             if !is_one(text) {
                 continue;
             }
-            if found.as_ref().is_some_and(|found| found.text != *text) {
+            if found.as_ref().is_some_and(|found| found.text != text) {
                 return Err("the files were recorded with different configurations; name the one that is meant: \
                             --config FILE"
                     .into());
             }
-            found = Some(RecordedText { name: name.clone(), text: text.clone() });
+            found = Some(RecordedText { name: name.to_owned(), text: text.to_owned() });
         }
         found.ok_or_else(|| "the files have no configuration; name it: --config FILE".into())
     }
@@ -150,7 +150,7 @@ fn are_others(infos: &[Info]) -> Result<bool, Failure> {
     let is_other = |info: &&Info| info.profile != PROFILE;
     let Some(other) = infos.iter().find(is_other) else { return Ok(false) };
     if let Some(ours) = infos.iter().find(|info| !is_other(info)) {
-        let (other, profile, ours) = (other.path.display(), line(&other.profile), ours.path.display());
+        let (other, profile, ours) = (other.path.display(), &other.profile, ours.path.display());
         return Err(format!(
             "{other} was not recorded by Rohrpost (profile `{profile}`), and {ours} was; replay them one by one"
         )

@@ -1,6 +1,7 @@
 //! Modules as a recording describes them: replay stands in for them without their programs.
 
 use rohrpost_schema::Description;
+use rohrpost_schema::plain::ForeignText;
 use std::collections::BTreeMap;
 
 /// A module's name.
@@ -16,7 +17,7 @@ const BYTES: &str = "description";
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DescribedModule {
     /// As the configuration has it: `laser.0`.
-    pub name: String,
+    pub name: ForeignText,
     /// What it says of itself.
     pub description: Description,
 }
@@ -26,7 +27,7 @@ impl DescribedModule {
     pub(crate) fn texts(&self) -> BTreeMap<String, String> {
         let Self { name, description } = self;
         let texts = [
-            (NAME, name.clone()),
+            (NAME, name.as_str().to_owned()),
             (CLASS, description.class.clone()),
             (INTERFACE, format!("{:08x}", description.hash())),
             (BYTES, description.to_bytes().iter().map(|byte| format!("{byte:02x}")).collect()),
@@ -39,7 +40,7 @@ impl DescribedModule {
         let (digits, rest) = texts.get(BYTES)?.as_bytes().as_chunks::<2>();
         let byte = |digits: &[u8; 2]| u8::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok();
         let bytes: Vec<u8> = digits.iter().map(byte).collect::<Option<_>>().filter(|_| rest.is_empty())?;
-        Some(Self { name: texts.get(NAME)?.clone(), description: Description::from_bytes(&bytes).ok()? })
+        Some(Self { name: texts.get(NAME)?.as_str().into(), description: Description::from_bytes(&bytes).ok()? })
     }
 }
 

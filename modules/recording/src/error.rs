@@ -1,6 +1,7 @@
 //! What goes wrong on the disk and in files.
 
 use crate::format::DESCRIBED_BYTES_MAX;
+use rohrpost_schema::plain::{self, ForeignText};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -114,13 +115,13 @@ pub enum RewriteError {
     Disk(#[from] DiskError),
 }
 
-/// A path in a message.
+/// A path in a message, in its line as [`ForeignText`] is: names of files may come from others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shown(pub PathBuf);
 
 impl fmt::Display for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.display().fmt(f)
+        f.write_str(&plain::line(&self.0.to_string_lossy()))
     }
 }
 
@@ -211,7 +212,7 @@ pub enum Damage {
     Compression,
     /// Written by another program.
     #[error("a chunk is compressed by `{0}`; zstd and lz4 are read here")]
-    ForeignCompression(String),
+    ForeignCompression(ForeignText),
     /// Its channel is not described before it.
     #[error("a message of channel {0}, which is not described")]
     UnknownChannel(u16),
@@ -221,4 +222,32 @@ pub enum Damage {
     /// Described twice, and not in the same way.
     #[error("channel or schema {0} is described twice, differently")]
     Redefined(u16),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{MergeError, SelectError};
+    use rohrpost_schema::plain::is_obeyed;
+
+    #[test]
+    fn texts_of_files_stay_in_their_line() {
+        let text = || ForeignText::from("x\u{1b}[2J\u{202e}\nFORGED: all is well");
+        let path = || Shown(PathBuf::from(text().as_str()));
+        let what = Damage::ForeignCompression(text());
+        let merge = MergeError::OtherType {
+            topic: text(),
+            first: path(),
+            first_type: text(),
+            second: path(),
+            second_type: text(),
+        };
+        for told in [
+            ReadError::Damaged { path: path(), at: 7, what }.to_string(),
+            merge.to_string(),
+            SelectError::NoName { name: "scan".into(), there: vec![text(), text()] }.to_string(),
+        ] {
+            assert!(!told.contains(is_obeyed) && told.contains(r"x\u001b[2J\u202e\nFORGED"), "{told}");
+        }
+    }
 }

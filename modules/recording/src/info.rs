@@ -11,9 +11,13 @@ use crate::read::frames::Frames;
 use crate::read::index::{Index, times_at};
 use mcap::records::Metadata;
 use rohrpost_schema::Type;
-use std::collections::BTreeMap;
+use rohrpost_schema::plain::ForeignText;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Metadata of a file: texts by their keys.
+pub type ForeignTexts = BTreeMap<ForeignText, ForeignText>;
 
 /// What is in a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,11 +29,11 @@ pub struct Info {
     /// It has its index and its end.
     pub is_closed: bool,
     /// Why it was closed, if its writer says so: `rotated`, `ended`, `low space`.
-    pub closed_because: Option<String>,
+    pub closed_because: Option<ForeignText>,
     /// Which program wrote it.
-    pub library: String,
+    pub library: ForeignText,
     /// Of which kind it is: `rohrpost` in our files, `ros2` in those of rosbag2.
-    pub profile: String,
+    pub profile: ForeignText,
     /// Where it is not readable: looked for in files that were not closed. The first hundred.
     pub damages: Vec<(u64, Damage)>,
     /// All of them.
@@ -44,43 +48,45 @@ pub struct Info {
     pub lost: u64,
     /// When the first message came, in nanoseconds of system time.
     pub first_ns: Option<u64>,
-    /// When the last one came.
+    /// When the last one came; not before the first.
     pub last_ns: Option<u64>,
     /// By topic.
     pub channels: Vec<ChannelInfo>,
     /// Stretches of system time between its steps.
     pub epochs: Vec<EpochInfo>,
     /// Node, versions and number of the file.
-    pub session: BTreeMap<String, String>,
-    /// Texts of the configuration, by file name.
+    pub session: ForeignTexts,
+    /// Texts of the configuration, by file name: the last one of each name.
     pub configuration: BTreeMap<String, String>,
+    /// Other texts that a name had before, as in a merged file: name and text.
+    pub earlier_configuration: BTreeSet<(String, String)>,
     /// Marks that were set, in the order of the file.
     pub marks: Vec<Mark>,
     /// Modules of which something is recorded, each interface of them once.
     pub described: Vec<DescribedModule>,
     /// What else the file says of itself: `rohrpost.recovered`, `rohrpost.cut`, `rohrpost.merged`, and others'.
-    pub others: Vec<(String, BTreeMap<String, String>)>,
+    pub others: Vec<(ForeignText, ForeignTexts)>,
 }
 
 /// One topic of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelInfo {
     /// Name and item.
-    pub topic: String,
+    pub topic: ForeignText,
     /// What published: `laser.0`; empty in files of other programs.
-    pub name: String,
+    pub name: ForeignText,
     /// What it published: `scan`.
-    pub item: String,
+    pub item: ForeignText,
     /// The name of its type.
-    pub type_name: String,
+    pub type_name: ForeignText,
     /// Its type, if it is one of ours.
     pub ty: Option<Arc<Type>>,
     /// How its type is described: `rohrpost-schema` in our files; empty: not at all.
-    pub schema_encoding: String,
+    pub schema_encoding: ForeignText,
     /// `postcard` in our files.
-    pub message_encoding: String,
+    pub message_encoding: ForeignText,
     /// The topic that it was drawn of for other programs, if it was.
-    pub drawn_of: Option<String>,
+    pub drawn_of: Option<ForeignText>,
     /// Pictures or points were reduced as they were drawn: some of them, or all.
     pub is_reduced: bool,
     /// Messages, without those that are repeated.
@@ -108,6 +114,25 @@ pub struct EpochInfo {
     pub messages: u64,
 }
 
+impl Info {
+    /// Name and text of each configuration that the file says it was made with.
+    pub fn configurations(&self) -> impl Iterator<Item = (&str, &str)> {
+        let earlier = self.earlier_configuration.iter().map(|(name, text)| (name, text));
+        earlier.chain(&self.configuration).map(|(name, text)| (name.as_str(), text.as_str()))
+    }
+
+    /// Each file that was merged says its own; mostly they are the same.
+    fn add_configuration(&mut self, texts: BTreeMap<String, String>) {
+        for (name, text) in texts {
+            if let Some(before) = self.configuration.insert(name.clone(), text.clone())
+                && before != text
+            {
+                self.earlier_configuration.insert((name, before));
+            }
+        }
+    }
+}
+
 /// Reads the index of a closed file; all of a file that is not, or that has no index of its messages, as others write.
 ///
 /// # Errors
@@ -115,7 +140,7 @@ pub struct EpochInfo {
 pub fn info(path: &Path) -> Result<Info, ReadError> {
     let mut frames = Frames::open(path)?;
     match Index::read(&mut frames) {
-        Ok(index) if index.knows_all_channels() => from_index(frames, &index),
+        Ok(index) if index.knows_all_channels() && index.knows_times() => from_index(frames, &index),
         Ok(_) | Err(ReadError::NotClosed { .. }) => from_all(path),
         Err(error) => Err(error),
     }
@@ -205,8 +230,8 @@ fn build(
         bytes: contents.file_bytes(),
         is_closed: false,
         closed_because: None,
-        library: contents.header().map(|header| header.library.clone()).unwrap_or_default(),
-        profile: contents.header().map(|header| header.profile.clone()).unwrap_or_default(),
+        library: contents.header().map(|header| header.library.as_str().into()).unwrap_or_default(),
+        profile: contents.header().map(|header| header.profile.as_str().into()).unwrap_or_default(),
         damages: Vec::new(),
         damage_count: 0,
         chunks: 0,
@@ -219,6 +244,7 @@ fn build(
         epochs: Vec::new(),
         session: BTreeMap::new(),
         configuration: BTreeMap::new(),
+        earlier_configuration: BTreeSet::new(),
         marks: Vec::new(),
         described: Vec::new(),
         others: Vec::new(),
@@ -228,11 +254,11 @@ fn build(
         let is_heeded = contents.heeds(&its);
         let Metadata { name, metadata: mut texts } = its;
         match name.as_str() {
-            _ if !is_heeded => info.others.push((name, texts)),
-            metadata::SESSION if info.session.is_empty() => info.session = texts,
-            metadata::CONFIGURATION => info.configuration.append(&mut texts),
+            _ if !is_heeded => info.others.push((name.into(), foreign(texts))),
+            metadata::SESSION if info.session.is_empty() => info.session = foreign(texts),
+            metadata::CONFIGURATION => info.add_configuration(texts),
             metadata::LOST => lost = format::counts(&texts),
-            metadata::CLOSED => info.closed_because = texts.remove("reason"),
+            metadata::CLOSED => info.closed_because = texts.remove("reason").map(ForeignText::from),
             // Epochs are told by the channels.
             metadata::EPOCH => {}
             metadata::MARK if let Some(mark) = Mark::of_texts(&texts) => info.marks.push(mark),
@@ -242,9 +268,9 @@ fn build(
                     memory.add(0, module.description.memory_bytes()).map_err(|limit| contents.too_much(limit))?;
                     info.described.push(module);
                 }
-                None => info.others.push((name, texts)),
+                None => info.others.push((name.into(), foreign(texts))),
             },
-            _ => info.others.push((name, texts)),
+            _ => info.others.push((name.into(), foreign(texts))),
         }
     }
     let mut channels: BTreeMap<&str, ChannelInfo> = BTreeMap::new();
@@ -270,7 +296,7 @@ fn build(
     }
     for (topic, count) in &lost {
         let channel = channels.entry(topic).or_default();
-        channel.topic.clone_from(topic);
+        channel.topic = topic.as_str().into();
         channel.lost = *count;
     }
     (info.first_ns, info.last_ns) = times.unzip();
@@ -286,6 +312,10 @@ fn build(
     Ok(info)
 }
 
+fn foreign(texts: BTreeMap<String, String>) -> ForeignTexts {
+    texts.into_iter().map(|(key, text)| (key.into(), text.into())).collect()
+}
+
 /// Files may claim any count.
 fn sum(counts: impl Iterator<Item = u64>) -> u64 {
     counts.fold(0, u64::saturating_add)
@@ -293,13 +323,14 @@ fn sum(counts: impl Iterator<Item = u64>) -> u64 {
 
 /// A topic has a channel for each epoch, all with the same description.
 fn describe(info: &mut ChannelInfo, channel: &Definition) {
-    let text = |key: &str| channel.texts.get(key).cloned().unwrap_or_default();
-    info.topic.clone_from(&channel.topic);
+    let said = |key: &str| channel.texts.get(key).map(|text| ForeignText::from(text.as_str()));
+    let text = |key: &str| said(key).unwrap_or_default();
+    info.topic = channel.topic.as_str().into();
     (info.name, info.item) = (text(key::NAME), text(key::ITEM));
-    info.type_name.clone_from(&channel.schema.name);
+    info.type_name = channel.schema.name.as_str().into();
     info.ty = channel.schema.ty().cloned();
-    info.schema_encoding.clone_from(&channel.schema.encoding);
-    info.message_encoding.clone_from(&channel.message_encoding);
-    info.drawn_of = channel.texts.get(key::DRAWN).cloned();
+    info.schema_encoding = channel.schema.encoding.as_str().into();
+    info.message_encoding = channel.message_encoding.as_str().into();
+    info.drawn_of = said(key::DRAWN);
     info.is_reduced |= channel.texts.contains_key(key::REDUCED);
 }

@@ -98,7 +98,7 @@ pub use described::DescribedModule;
 pub use disk::is_being_written;
 pub use drawn::{DrawError, DrawOptions, Drawn, DrawnBeside, draw};
 pub use error::{Damage, DiskError, FileLimit, ReadError, RewriteError, Shown};
-pub use info::{ChannelInfo, EpochInfo, Info, info};
+pub use info::{ChannelInfo, EpochInfo, ForeignTexts, Info, info};
 pub use merge::{MergeError, merge};
 pub use newest::Earlier;
 pub use options::{Options, Session};

@@ -8,6 +8,7 @@ use crate::read::frames::Frames;
 use crate::read::index::Index;
 use crate::rewrite::{Progress, Rewriter};
 use mcap::records::Metadata;
+use rohrpost_schema::plain::ForeignText;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -32,15 +33,15 @@ pub enum MergeError {
     )]
     OtherType {
         /// Name and item.
-        topic: String,
+        topic: ForeignText,
         /// A file.
         first: Shown,
         /// Its type there.
-        first_type: String,
+        first_type: ForeignText,
         /// Another file.
         second: Shown,
         /// Its type there.
-        second_type: String,
+        second_type: ForeignText,
     },
 }
 
@@ -185,11 +186,11 @@ fn check_types(paths: &[PathBuf]) -> Result<BTreeMap<String, Arc<SchemaText>>, M
             let (known, first) = types.entry(topic.clone()).or_insert_with(|| (schema.clone(), path));
             if !known.is_same_type(schema) {
                 return Err(MergeError::OtherType {
-                    topic: topic.clone(),
+                    topic: topic.as_str().into(),
                     first: Shown(first.to_owned()),
-                    first_type: known.describe(),
+                    first_type: known.describe().into(),
                     second: Shown(path.clone()),
-                    second_type: schema.describe(),
+                    second_type: schema.describe().into(),
                 });
             }
         }

@@ -2,6 +2,7 @@
 
 use crate::error::DiskError;
 use crate::format::key;
+use rohrpost_schema::plain::ForeignText;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
@@ -19,7 +20,7 @@ pub struct Mark {
     /// Which stretch of system time between two steps of it that is of.
     pub epoch: u64,
     /// What it says.
-    pub text: String,
+    pub text: ForeignText,
 }
 
 impl Mark {
@@ -35,15 +36,18 @@ impl Mark {
 
     /// As a file has it.
     pub(crate) fn texts(&self) -> BTreeMap<String, String> {
-        let texts =
-            [("text", self.text.clone()), ("time-ns", self.time_ns.to_string()), (key::EPOCH, self.epoch.to_string())];
+        let texts = [
+            ("text", self.text.as_str().to_owned()),
+            ("time-ns", self.time_ns.to_string()),
+            (key::EPOCH, self.epoch.to_string()),
+        ];
         texts.into_iter().map(|(key, text)| (key.to_owned(), text)).collect()
     }
 
     /// As a file has it; none if that is no mark.
     pub(crate) fn of_texts(texts: &BTreeMap<String, String>) -> Option<Self> {
         let number = |key: &str| texts.get(key)?.parse().ok();
-        Some(Self { time_ns: number("time-ns")?, epoch: number(key::EPOCH)?, text: texts.get("text")?.clone() })
+        Some(Self { time_ns: number("time-ns")?, epoch: number(key::EPOCH)?, text: texts.get("text")?.as_str().into() })
     }
 }
 

@@ -10,6 +10,7 @@ use crate::read::index::Index;
 use crate::read::selected::Selected;
 use crate::selection::{SelectError, Selection};
 use rohrpost_schema::Type;
+use rohrpost_schema::plain::ForeignText;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -18,17 +19,17 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedChannel {
     /// Name and item.
-    pub topic: String,
+    pub topic: ForeignText,
     /// What published: `laser.0`; empty in files of other programs.
-    pub name: String,
+    pub name: ForeignText,
     /// What it published: `scan`.
-    pub item: String,
+    pub item: ForeignText,
     /// Its type, if it is one of ours.
     pub ty: Option<Arc<Type>>,
     /// `postcard` in our files.
-    pub message_encoding: String,
+    pub message_encoding: ForeignText,
     /// How its type is described: `rohrpost-schema` in our files; empty: not at all.
-    pub schema_encoding: String,
+    pub schema_encoding: ForeignText,
     /// What else was said when it was recorded. In files of other programs without what they say under keys of ours,
     /// where it means something else.
     pub texts: BTreeMap<String, String>,
@@ -211,14 +212,14 @@ impl ReaderSource {
 }
 
 fn recorded(channel: &Definition) -> RecordedChannel {
-    let text = |key: &str| channel.texts.get(key).cloned().unwrap_or_default();
+    let text = |key: &str| channel.texts.get(key).map(|text| text.as_str().into()).unwrap_or_default();
     RecordedChannel {
-        topic: channel.topic.clone(),
+        topic: channel.topic.as_str().into(),
         name: text(key::NAME),
         item: text(key::ITEM),
         ty: channel.schema.ty().cloned(),
-        message_encoding: channel.message_encoding.clone(),
-        schema_encoding: channel.schema.encoding.clone(),
+        message_encoding: channel.message_encoding.as_str().into(),
+        schema_encoding: channel.schema.encoding.as_str().into(),
         texts: channel.texts.clone(),
     }
 }

@@ -3,6 +3,7 @@
 use crate::error::ReadError;
 use crate::format::key;
 use crate::read::definitions::Definition;
+use rohrpost_schema::plain::ForeignText;
 use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
@@ -32,7 +33,7 @@ pub enum SelectError {
         /// What was asked for.
         name: String,
         /// All topics.
-        there: Vec<String>,
+        there: Vec<ForeignText>,
     },
     /// The end is not behind the beginning.
     #[error("the time range is empty: it begins at {from_ns} ns and ends at {until_ns} ns")]
@@ -58,7 +59,7 @@ impl Selection {
         let channels: Vec<&Definition> = channels.collect();
         let is_missing = |name: &&String| !channels.iter().any(|channel| is_of(channel, name));
         let Some(name) = self.names.iter().find(is_missing) else { return Ok(()) };
-        let mut there: Vec<String> = channels.iter().map(|channel| channel.topic.clone()).collect();
+        let mut there: Vec<ForeignText> = channels.iter().map(|channel| channel.topic.as_str().into()).collect();
         there.sort();
         there.dedup();
         Err(SelectError::NoName { name: name.clone(), there })
@@ -85,9 +86,9 @@ impl Selection {
     }
 }
 
-/// Topics in one line: those of others may hold ends of lines.
-pub(crate) fn listed(topics: &[String]) -> String {
-    topics.iter().map(|topic| topic.escape_debug().to_string()).collect::<Vec<_>>().join(", ")
+/// Topics in one line.
+pub(crate) fn listed(topics: &[ForeignText]) -> String {
+    topics.iter().map(ForeignText::to_string).collect::<Vec<_>>().join(", ")
 }
 
 fn is_of(channel: &Definition, name: &str) -> bool {

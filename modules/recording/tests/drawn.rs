@@ -41,7 +41,12 @@ fn options(with_original: bool) -> DrawOptions {
 
 /// Topics of a file, with the name of each type.
 fn topics(path: &Path) -> Vec<(String, String)> {
-    info(path).unwrap().channels.into_iter().map(|channel| (channel.topic, channel.type_name)).collect()
+    info(path)
+        .unwrap()
+        .channels
+        .into_iter()
+        .map(|channel| (channel.topic.to_string(), channel.type_name.to_string()))
+        .collect()
 }
 
 #[test]
@@ -72,7 +77,7 @@ fn each_kind_of_sight_is_drawn_and_marked() {
     for channel in told.channels {
         // Where the world is, is said with the first that has a place in it.
         let source = channel.topic.replace("world", "odometry.0/odometry").rsplit_once('/').unwrap().0.to_owned();
-        assert_eq!((channel.drawn_of, channel.message_encoding.as_str()), (Some(source), "protobuf"));
+        assert_eq!((channel.drawn_of, channel.message_encoding.as_str()), (Some(source.into()), "protobuf"));
     }
 }
 
@@ -90,7 +95,7 @@ fn what_is_drawn_keeps_its_times() {
             assert_eq!((&channel.texts["drawn"], times), (&topic, its));
             drawn += 1;
         } else {
-            source = Some((channel.topic.clone(), times));
+            source = Some((channel.topic.to_string(), times));
             copied += 1;
         }
     }
@@ -152,7 +157,7 @@ fn nothing_long_is_in_a_file_twice() {
 /// Topics that are told to be reduced.
 fn reduced(path: &Path) -> Vec<String> {
     let channels = info(path).unwrap().channels.into_iter().filter(|channel| channel.is_reduced);
-    channels.map(|channel| channel.topic).collect()
+    channels.map(|channel| channel.topic.to_string()).collect()
 }
 
 #[test]
@@ -202,7 +207,7 @@ fn drawn_of(path: &Path) -> Vec<(String, u64, u32, Vec<u8>)> {
     let mut drawn = Vec::new();
     while let Some((channel, message)) = reader.next().unwrap() {
         if channel.is_drawn() {
-            drawn.push((channel.topic.clone(), message.stamp_ns, message.sequence, message.data.to_vec()));
+            drawn.push((channel.topic.to_string(), message.stamp_ns, message.sequence, message.data.to_vec()));
         }
     }
     drawn

@@ -15,6 +15,8 @@
 //! [`DEPTH_MAX`], a claimed length is compared with the bytes that are left before anything is allocated for it, and
 //! all values of a message are counted (`budget.rs`).
 //!
+//! Texts of others are shown as [`plain`] writes them.
+//!
 //! What encodes and decodes again is the same, with one exception: which of the many NaNs an `f32` was may change.
 //!
 //! Knows no mailbox and no module.
@@ -36,6 +38,7 @@ mod encode;
 mod error;
 mod json;
 mod label;
+pub mod plain;
 mod quantities;
 mod scalar;
 mod serial;

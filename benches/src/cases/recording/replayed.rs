@@ -117,7 +117,7 @@ impl DemoRecording {
     /// Seconds of the demo that all its programs run through in a second, one program after the other.
     fn speed(&self) -> Result<f64, Failure> {
         let began = Instant::now();
-        let said = self.run(&["replay", "--exact", FILE, "--json"])?;
+        let said = self.run(&["replay", "--exact", "--run-recorded", FILE, "--json"])?;
         let took = began.elapsed();
         let runs: Vec<serde_json::Value> = said
             .lines()

@@ -30,6 +30,7 @@ use crate::selection::{SelectError, Selection, listed};
 pub(crate) use beside::DrawingBeside;
 pub use beside::DrawnBeside;
 use drawer::Drawer;
+use rohrpost_schema::plain::ForeignText;
 use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
@@ -57,16 +58,16 @@ pub struct Drawn {
     /// Its messages.
     pub messages: u64,
     /// Those of them that were drawn, by topic.
-    pub drawn: BTreeMap<String, u64>,
+    pub drawn: BTreeMap<ForeignText, u64>,
     /// Values that could not be drawn, by topic: they contradict themselves, or have a place that is no number.
-    pub not_drawn: BTreeMap<String, u64>,
+    pub not_drawn: BTreeMap<ForeignText, u64>,
     /// Values that are in the file as they were recorded, too long to be in it twice, and no pixels or points: by
     /// topic.
-    pub too_long: BTreeMap<String, u64>,
+    pub too_long: BTreeMap<ForeignText, u64>,
     /// Topics of which nothing is drawn.
-    pub without: Vec<String>,
+    pub without: Vec<ForeignText>,
     /// The module that is taken to carry scanners: their points are in its frame. None: they are in that of the world.
-    pub carrier: Option<String>,
+    pub carrier: Option<ForeignText>,
 }
 
 /// Why nothing was drawn.
@@ -88,7 +89,7 @@ pub enum DrawError {
     )]
     Nothing {
         /// Topics that were selected.
-        there: Vec<String>,
+        there: Vec<ForeignText>,
     },
 }
 
@@ -133,7 +134,7 @@ impl Drawing {
         let mut drawing = Self { drawer: Drawer::new(options.classes.clone(), bytes_max), told: Drawn::default() };
         for (id, channel) in selected.channels().filter(|(_, its)| !its.texts.contains_key(key::DRAWN)) {
             if drawing.drawer.add(id, channel).is_none() {
-                drawing.told.without.push(channel.topic.clone());
+                drawing.told.without.push(channel.topic.as_str().into());
             }
         }
         drawing.told.without.sort();
@@ -141,7 +142,7 @@ impl Drawing {
         if drawing.drawer.is_empty() {
             return Err(DrawError::Nothing { there: drawing.told.without });
         }
-        drawing.told.carrier = drawing.drawer.carrier().cloned();
+        drawing.told.carrier = drawing.drawer.carrier().map(|carrier| carrier.as_str().into());
         Ok(drawing)
     }
 
@@ -160,7 +161,8 @@ impl Drawing {
         if !self.drawer.draws(id) {
             return Ok(());
         }
-        let count = |counts: &mut BTreeMap<String, u64>, topic: &str| *counts.entry(topic.into()).or_default() += 1;
+        let count =
+            |counts: &mut BTreeMap<ForeignText, u64>, topic: &str| *counts.entry(topic.into()).or_default() += 1;
         let Some(messages) = self.drawer.draw(id, channel, header.publish_time, data) else {
             count(&mut self.told.not_drawn, &channel.topic);
             return Ok(());

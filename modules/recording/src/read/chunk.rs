@@ -93,7 +93,7 @@ fn decompress(compression: &[u8], packed: &[u8], most: u64, records: &mut Vec<u8
             let decoder = lz4_flex::frame::FrameDecoder::new(packed);
             decoder.take(most).read_to_end(records).map_err(|_| Damage::Compression)?;
         }
-        other => return Err(Damage::ForeignCompression(String::from_utf8_lossy(other).into_owned())),
+        other => return Err(Damage::ForeignCompression((*String::from_utf8_lossy(other)).into())),
     }
     Ok(())
 }

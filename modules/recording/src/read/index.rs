@@ -42,6 +42,11 @@ impl Index {
             && counts.all(|(id, messages)| *messages == 0 || has_offset(id))
     }
 
+    /// Whether its times can be those of messages: the first is not behind the last.
+    pub(crate) fn knows_times(&self) -> bool {
+        self.statistics.message_start_time <= self.statistics.message_end_time
+    }
+
     /// Reads it, checked by its sum.
     pub(crate) fn read(frames: &mut Frames) -> Result<Self, ReadError> {
         let not_closed = ReadError::NotClosed { path: Shown(frames.path().to_owned()) };

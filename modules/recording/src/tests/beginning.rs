@@ -117,7 +117,7 @@ pub(super) fn beginning(path: &Path) -> (Vec<(Kept, u64, Vec<u8>)>, u64) {
             return (repeated, message.arrival_ns);
         }
         let Message { arrival_ns, stamp_ns, epoch, sequence, data } = message;
-        repeated.push(((channel.topic.clone(), stamp_ns, epoch, sequence), arrival_ns, data.to_vec()));
+        repeated.push(((channel.topic.to_string(), stamp_ns, epoch, sequence), arrival_ns, data.to_vec()));
     }
     panic!("nothing but repetitions in {}", path.display());
 }

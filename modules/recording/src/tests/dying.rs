@@ -109,7 +109,7 @@ fn record_until_dead(disk: DyingDisk, folder: &Path) -> (Status, Vec<String>) {
         }
         if number % 40 == 20 {
             let text = number.to_string();
-            let mark = Mark { time_ns: 1, epoch: 1, text: text.clone() };
+            let mark = Mark { time_ns: 1, epoch: 1, text: text.as_str().into() };
             let pending = writer.mark(mark).unwrap();
             wait_for(&mut told, Some(text), pending);
         }
@@ -155,9 +155,9 @@ fn whatever_step_is_its_last_all_that_was_told_to_be_written_is_there() {
             recover(path, &recovered_path(path), &mut |_, _| {}).unwrap();
             kept.extend(read(&recovered_path(path)).0);
             let told = info(&recovered_path(path)).unwrap();
-            marks.extend(told.marks.into_iter().map(|mark| mark.text));
+            marks.extend(told.marks.into_iter().map(|mark| mark.text.to_string()));
             for channel in told.channels {
-                *lost.entry(channel.topic).or_default() += channel.lost;
+                *lost.entry(channel.topic.to_string()).or_default() += channel.lost;
             }
         }
         assert!(kept == all[..kept.len()], "{steps}: in order, nothing twice, nothing made up");

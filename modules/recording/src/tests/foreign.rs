@@ -1,7 +1,7 @@
 //! Files of other programs: listed, whatever they hold and however they are packed.
 
 use super::support::memory_folder;
-use crate::format::{key, metadata};
+use crate::format::{key, metadata, op};
 use crate::read::chunk;
 use crate::{Damage, Info, Reader, Selection, cut, info, merge, recover};
 use mcap::records::{MessageHeader, Metadata};
@@ -199,4 +199,21 @@ fn chunks_packed_by_lz4_are_read_and_others_are_named() {
     }
     let told = chunk::unpack(&chunk_of(&records, len, "bz2", &packed), &mut found);
     assert_eq!(told, Err(Damage::ForeignCompression("bz2".into())));
+}
+
+/// The index says that the last message came before the first. The messages themselves say when they came.
+#[test]
+fn times_of_an_index_that_contradicts_itself_are_those_of_the_messages() {
+    let folder = memory_folder();
+    let path = folder.path().join("0.mcap");
+    write(&path, WriteOptions::new().calculate_summary_section_crc(false));
+    let mut bytes = std::fs::read(&path).unwrap();
+    // Statistics: type and length; counts of 8, 2 and four times 4 bytes; two times; a count of each of four channels.
+    let head = [&[op::STATISTICS][..], &86_u64.to_le_bytes()].concat();
+    let times = bytes.windows(9).rposition(|its| its == head).unwrap() + 9 + 26;
+    let (first, last) = bytes[times..times + 16].split_at_mut(8);
+    assert_eq!((&*first, &*last), (&[0; 8][..], &39_000_u64.to_le_bytes()[..]));
+    first.swap_with_slice(last);
+    std::fs::write(&path, bytes).unwrap();
+    check(&info(&path).unwrap(), "first and last exchanged");
 }

@@ -247,7 +247,7 @@ fn kept(folder: &Path) -> (Vec<String>, u64) {
     for path in files(folder) {
         let to: PathBuf = recovered_path(&path);
         messages += recover(&path, &to, &mut |_, _| {}).unwrap().messages;
-        marks.extend(info(&to).unwrap().marks.into_iter().map(|mark| mark.text));
+        marks.extend(info(&to).unwrap().marks.into_iter().map(|mark| mark.text.to_string()));
     }
     (marks, messages)
 }

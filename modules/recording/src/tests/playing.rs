@@ -22,7 +22,7 @@ fn play(player: &mut Player, step_ns: u64) -> Vec<Did> {
                 did.push(Did::Begun { system_ns, epoch });
             }
             Cue::Message(channel, message) => {
-                let (topic, sequence) = (channel.topic.clone(), message.sequence);
+                let (topic, sequence) = (channel.topic.to_string(), message.sequence);
                 did.push(Did::Played { at_ns: now_ns, topic, sequence });
             }
             Cue::Wait { until_ns } => {

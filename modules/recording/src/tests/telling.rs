@@ -35,10 +35,8 @@ fn a_file_is_read_message_by_message_for_replay() {
     let mut reader = Reader::open(&path).unwrap();
     for said in &all {
         let (channel, message) = reader.next().unwrap().unwrap();
-        assert_eq!(
-            (&channel.topic, channel.item.as_str(), channel.ty.as_deref()),
-            (&said.topic, "scan", Some(&Type::Bytes))
-        );
+        assert_eq!((channel.topic.as_str(), channel.item.as_str()), (said.topic.as_str(), "scan"));
+        assert_eq!(channel.ty.as_deref(), Some(&Type::Bytes));
         assert_eq!((message.arrival_ns, message.stamp_ns), (said.arrival_ns, said.stamp_ns));
         assert_eq!((message.epoch, message.sequence, message.data), (said.epoch, said.sequence, &said.data[..]));
     }

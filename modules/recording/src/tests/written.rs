@@ -36,7 +36,7 @@ proptest! {
         prop_assert!(told.is_closed && told.damages.is_empty());
         prop_assert_eq!(told.messages, all.len() as u64);
         for channel in &told.channels {
-            let its: Vec<&Said> = all.iter().filter(|said| said.topic == channel.topic).collect();
+            let its: Vec<&Said> = all.iter().filter(|said| channel.topic == said.topic).collect();
             prop_assert_eq!(channel.messages, its.len() as u64);
             prop_assert_eq!(channel.first_ns, its.first().map(|said| said.arrival_ns));
             prop_assert_eq!(channel.last_ns, its.last().map(|said| said.arrival_ns));
@@ -61,7 +61,7 @@ fn files_are_rotated_by_size_without_a_loss_and_each_stands_alone() {
     for (number, path) in files.iter().enumerate() {
         let told = info(path).unwrap();
         assert!(told.bytes <= (3 << 20) + (64 << 10), "{}", told.bytes);
-        assert_eq!((told.channels.len(), told.session["file"].clone()), (3, (number + 1).to_string()));
+        assert_eq!((told.channels.len(), told.session["file"].to_string()), (3, (number + 1).to_string()));
         assert_eq!(told.session["node"], "base");
         assert_eq!(told.configuration["robot.toml"], "system = \"demo\"\n");
         assert!(told.channels.iter().all(|channel| channel.ty.as_deref() == Some(&Type::Bytes)));
@@ -220,6 +220,7 @@ fn modules_are_described_in_each_file_and_in_what_is_made_of_it() {
     for path in made {
         assert_eq!(info(&path).unwrap().described, all, "{path:?}: once, from whichever file");
     }
-    let identities: Vec<String> = paths.iter().map(|path| info(path).unwrap().session["recording"].clone()).collect();
+    let identities: Vec<String> =
+        paths.iter().map(|path| info(path).unwrap().session["recording"].to_string()).collect();
     assert!(identities.iter().all(|identity| *identity == identities[0]), "{identities:?}");
 }

@@ -5,8 +5,10 @@
 //! What a terminal would obey is written out as JSON does it, such as `\u001b`: so a line of JSON means the same
 //! afterwards.
 
-use std::borrow::Cow;
+use serde::Serialize;
+use std::borrow::{Borrow, Cow};
 use std::fmt::{self, Write};
+use std::ops::Deref;
 
 /// Whether a terminal obeys this character, or shows it nowhere: control characters (C0, DEL, C1), those that change
 /// the direction of writing or separate lines, and those that have no width.
@@ -40,6 +42,65 @@ fn write_plain(c: char, to: &mut (impl Write + ?Sized)) -> fmt::Result {
         '\t' => to.write_str("\\t"),
         c if is_obeyed(c) => c.encode_utf16(&mut [0; 2]).iter().try_for_each(|unit| write!(to, "\\u{unit:04x}")),
         c => to.write_char(c),
+    }
+}
+
+/// A text of others, such as a topic that a file names. Shown, it is as [`line`] writes it: so no message with it can
+/// forget to. Compared, looked up and serialised it is what it is.
+///
+/// ```
+/// use rohrpost_schema::plain::ForeignText;
+///
+/// let topic = ForeignText::from("/scan\nall is well");
+/// assert_eq!(topic.to_string(), "/scan\\nall is well");
+/// assert_eq!(topic, "/scan\nall is well");
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(transparent)]
+pub struct ForeignText(String);
+
+impl ForeignText {
+    /// As others wrote it; not for a terminal.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for ForeignText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&line(&self.0))
+    }
+}
+
+impl Deref for ForeignText {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Borrow<str> for ForeignText {
+    fn borrow(&self) -> &str {
+        &self.0
+    }
+}
+
+impl From<String> for ForeignText {
+    fn from(text: String) -> Self {
+        Self(text)
+    }
+}
+
+impl From<&str> for ForeignText {
+    fn from(text: &str) -> Self {
+        Self(text.to_owned())
+    }
+}
+
+impl<T: AsRef<str> + ?Sized> PartialEq<T> for ForeignText {
+    fn eq(&self, other: &T) -> bool {
+        self.0 == other.as_ref()
     }
 }
 
