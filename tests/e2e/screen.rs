@@ -93,7 +93,7 @@ fn every_tool_fits_a_terminal_of_eighty_columns() {
     for tool in asked.chain(each) {
         let (terminal, mut running) = Terminal::start(&place, &tool, 24, COLUMNS);
         running.end();
-        let drawn = terminal.to_the_end();
+        let drawn = terminal.into_all_drawn();
         assert!(!drawn.is_empty(), "{tool:?} says nothing");
         let widest = drawn.lines().max_by_key(|line| line.chars().count()).unwrap_or_default();
         if widest.chars().count() > COLUMNS.into() {

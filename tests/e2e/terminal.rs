@@ -134,7 +134,7 @@ impl Terminal {
     }
 
     /// All that was drawn, once nobody has it open any more.
-    pub(crate) fn to_the_end(mut self) -> String {
+    pub(crate) fn into_all_drawn(mut self) -> String {
         self.reader.take().unwrap().join().unwrap();
         self.drawn()
     }

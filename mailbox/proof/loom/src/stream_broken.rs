@@ -284,7 +284,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     ),
     broken(
         "stream_any_record_before_will_do",
-        &[edit("stream/lookup", "if line.about.stamp == stamp => Some(line)", "=> Some(line)")],
+        &[edit("stream/lookup", "if line.about.stamp == stamp =>", "if line.about.stamp <= stamp =>")],
         "an_overwritten_look_says_so",
         "not the nearest",
     ),
