@@ -4,9 +4,10 @@
 
 mod support;
 
+use rohrpost_testbed::report::has_two_processors;
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
-use support::{bench, children, has_two_processors, interrupt, left_behind, rows, run, wait_for};
+use support::{bench, children, interrupt, left_behind, rows, run, wait_for};
 
 const CBWARE: &str = "CBWare, its table";
 

@@ -5,8 +5,9 @@
 
 mod support;
 
+use rohrpost_testbed::report::has_two_processors;
 use serde_json::{Map, Value};
-use support::{FAILED, bench, children, has_two_processors, interrupt, left_behind, rows, run, wait_for};
+use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
 
 /// Case and contender; what the last one says when it could not run here is reported by `rows`.
 const ROWS: [(&str, &str); 15] = [

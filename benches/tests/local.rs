@@ -6,10 +6,9 @@
 mod support;
 
 use nix::sys::signal::Signal;
+use rohrpost_testbed::report::has_two_processors;
 use std::process::Child;
-use support::{
-    are_gone, bench, children, has_two_processors, interrupt, left_behind, prefix, rows, run, signal, wait_for,
-};
+use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
 
 /// The latency cases: sizes, and the contenders besides ours.
 const CASES: [(&str, &[u64], &[&str]); 8] = [

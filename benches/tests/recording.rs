@@ -6,9 +6,8 @@
 mod support;
 
 use nix::sys::signal::Signal;
-use support::{
-    are_gone, bench, children, has_two_processors, interrupt, left_behind, prefix, rows, run, signal, wait_for,
-};
+use rohrpost_testbed::report::has_two_processors;
+use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
 
 const SIZES: [u64; 4] = [100, 1000, 62_000, 4 << 20];
 

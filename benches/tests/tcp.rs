@@ -4,8 +4,9 @@
 
 mod support;
 
+use rohrpost_testbed::report::has_two_processors;
 use serde_json::{Map, Value};
-use support::{FAILED, bench, children, has_two_processors, interrupt, left_behind, rows, run, wait_for};
+use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
 
 /// A row that exists whenever its case could run: case and contender.
 const ROWS: [(&str, &str); 18] = [

@@ -6,7 +6,7 @@ mod support;
 
 use rohrpost_testbed::report;
 use serde_json::{Map, Value};
-use support::{FAILED, bench, children, has_two_processors, interrupt, left_behind, prefix, rows, run, wait_for};
+use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
 
 /// A row of each case that exists whenever the case could run, and its contender.
 const ROWS: [(&str, &str); 21] = [
@@ -40,7 +40,7 @@ fn case_of(row: &Map<String, Value>) -> String {
 
 #[test]
 fn every_case_runs_and_every_line_is_complete() {
-    if !has_two_processors() {
+    if !report::has_two_processors() {
         return;
     }
     let (output, prefix) = run("tdma", &["--quick", "--json"]);

@@ -1,6 +1,7 @@
 //! `rohrpost bench local`. Its sentence for other computers is tested beside its code, its measurements in `benches`.
 
 use crate::harness::{OUTPUT, Place, probe};
+use rohrpost_testbed::report::has_two_processors;
 use serde_json::Value;
 
 /// Sizes of each case, and the floor beside it.
@@ -8,6 +9,9 @@ const CASES: [(&str, &str); 2] = [("blocking", "futex"), ("spinning", "spin")];
 
 #[test]
 fn the_self_test_has_all_figures() {
+    if !has_two_processors() {
+        return;
+    }
     let place = Place::new();
     let said = place.say(&["bench", "local", "--json"]);
     let lines: Vec<Value> = said.ok().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -36,6 +40,9 @@ fn the_self_test_has_all_figures() {
 
 #[test]
 fn a_running_robot_is_not_disturbed_and_the_user_is_told() {
+    if !has_two_processors() {
+        return;
+    }
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
     let pid = robot.pid("probe.0");

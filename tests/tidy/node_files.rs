@@ -11,6 +11,8 @@ const OTHERS: &[(&str, &str)] = &[
     ("mailbox/src/files.rs", "the place"),
     ("mailbox/src/doorbell.rs", "opens pipes, on the stack, relative to the directory"),
     ("mailbox/src/sys.rs", "files of the system, not of a node"),
+    ("mailbox/src/sys/family.rs", "the same"),
+    ("mailbox/src/process.rs", "the same: what the kernel says of a process"),
 ];
 
 /// The path of a file in a node's directory, as other crates would build it.

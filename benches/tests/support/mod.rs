@@ -15,16 +15,6 @@ pub(crate) const FAILED: &str = "FAILED";
 /// Longer than anything here takes on a busy computer.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Whether measuring between two processors can be tested here; reported if not.
-#[track_caller]
-pub(crate) fn has_two_processors() -> bool {
-    let has = std::thread::available_parallelism().is_ok_and(|processors| processors.get() >= 2);
-    if !has {
-        report::skipped("benches: measuring between two processors, of which there is one");
-    }
-    has
-}
-
 /// A run of this subcommand.
 pub(crate) fn bench(subcommand: &str, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_rohrpost-bench"));

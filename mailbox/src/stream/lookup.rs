@@ -12,10 +12,10 @@
 //!                           ▲ nearest before p     ▲ nearer ▲ before 44, after 50
 //! ```
 //!
-//! An answer is final when no other stamp that is taken from now on could change it: the newest stamp is past the later
-//! of the two by `late_ns`, or another epoch has begun. A lost record could have been nearer unless the answer is past
-//! all lost ones. So answers depend on stamps, never on arrival. Of records with one stamp the newest written counts: it
-//! corrects those before it, also where one of them was answered already.
+//! An answer is final when no other stamp that is taken from now on could change it: the newest stamp is past the
+//! later of the two by `late_ns`, or another epoch has begun. A lost record could have been nearer unless the answer is
+//! past all lost ones. So answers depend on stamps, never on arrival. Of records with one stamp the newest written
+//! counts: it corrects those before it, also where one of them was answered already.
 
 use crate::stream::ring::{Line, Look, Ring, Stamp, TRIES};
 

@@ -277,10 +277,7 @@ impl Launch {
     pub fn failures(&self) -> Vec<String> {
         let failure = |child: &Child| match child.phase() {
             Phase::Failed => Some(format!("{} failed for good: {}", child.text(), child.last_end())),
-            _ => {
-                let why = child.present_error(&self.node);
-                why.map(|why| format!("{} is in error: {}", child.text(), plain::line(why)))
-            }
+            _ => child.present_error(&self.node),
         };
         self.children.iter().filter_map(failure).collect()
     }

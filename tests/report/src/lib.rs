@@ -24,6 +24,16 @@ pub fn skipped_at(place: &Location<'_>, what: &str) {
     say("skipped", place, what);
 }
 
+/// Whether what is measured between two processors can be tested here. If not, the caller's test leaves it out.
+#[track_caller]
+pub fn has_two_processors() -> bool {
+    let has = std::thread::available_parallelism().is_ok_and(|processors| processors.get() >= 2);
+    if !has {
+        skipped("measuring between two processors, of which there is one");
+    }
+    has
+}
+
 /// A test runs once more, for this reason.
 pub fn repeated(place: &Location<'_>, why: &str) {
     say("repeated", place, why);

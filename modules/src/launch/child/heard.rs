@@ -2,6 +2,7 @@
 
 use super::Child;
 use crate::common::OutputLevel;
+use crate::output::plain;
 use rohrpost_mailbox::{ModuleState, Node, ParticipantInfo};
 use std::time::Instant;
 
@@ -38,9 +39,10 @@ impl Child {
         self.health.asks_why(in_trouble)
     }
 
-    /// Why it is in error now, if it is.
-    pub(in crate::launch) fn present_error(&self, node: &Node) -> Option<&str> {
-        self.health.present_error().filter(|_| self.in_error(node).is_some())
+    /// That it is in error now, if it is, and why.
+    pub(in crate::launch) fn present_error(&self, node: &Node) -> Option<String> {
+        let why = self.health.present_error().filter(|_| self.in_error(node).is_some());
+        why.map(|why| format!("{} is in error: {}", self.text, plain::line(why)))
     }
 
     /// Looks whether a part of its own code has not come back for long.
