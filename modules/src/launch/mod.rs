@@ -37,7 +37,7 @@ pub use leftovers::CONFIG_FILE;
 pub use orphans::reap_orphans;
 
 use crate::launcher::{Known, Phase};
-use crate::output::{Relay, plain};
+use crate::output::Relay;
 use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
