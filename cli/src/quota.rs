@@ -5,7 +5,7 @@ use crate::units::size;
 use std::path::Path;
 use thiserror::Error;
 
-/// Shared memory that a recorded configuration may ask for: mailboxes, streams and journals of a node.
+/// Shared memory that a recorded configuration may ask for where it is not known what this computer has.
 const SHARED_BYTES_MAX: u64 = 2 << 30;
 /// Disk for what is unpacked of a recording: so much, and so many bytes for each of its own. Pictures that are drawn by
 /// a simulation compress a hundredfold, those of cameras and journals tenfold.
@@ -24,11 +24,17 @@ pub(crate) enum QuotaError {
     Unpacked(u64),
     /// Shared memory.
     #[error(
-        "the recorded configuration asks for {} of shared memory, and a recording gets at most {}",
-        size(*.0),
-        size(SHARED_BYTES_MAX)
+        "the recorded configuration asks for {} of shared memory, and a recording gets at most {}, half of what this \
+         computer has free",
+        size(*asked),
+        size(*most)
     )]
-    Shared(u64),
+    Shared {
+        /// Bytes.
+        asked: u64,
+        /// Bytes, too.
+        most: u64,
+    },
 }
 
 /// Disk for what is unpacked of recordings.
@@ -57,9 +63,20 @@ impl UnpackedQuota {
     }
 }
 
-/// Whether a recorded configuration may ask for so much shared memory.
+/// Whether a recorded configuration may ask for so much shared memory: mailboxes, streams and journals of a node.
 pub(crate) fn check_shared(bytes: u64) -> Result<(), QuotaError> {
-    if bytes > SHARED_BYTES_MAX { Err(QuotaError::Shared(bytes)) } else { Ok(()) }
+    let memory = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    within(bytes, available_bytes(&memory).map_or(SHARED_BYTES_MAX, |bytes| bytes / 2))
+}
+
+fn within(asked: u64, most: u64) -> Result<(), QuotaError> {
+    if asked > most { Err(QuotaError::Shared { asked, most }) } else { Ok(()) }
+}
+
+/// What `/proc/meminfo` says that programs may still use.
+fn available_bytes(memory: &str) -> Option<u64> {
+    let line = memory.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
 #[cfg(test)]
@@ -72,9 +89,12 @@ mod tests {
         assert_eq!([6 << 20, 4 << 20, 1].map(|bytes| quota.take(bytes).is_ok()), [true, true, false]);
         let told = quota.take(1).unwrap_err().to_string();
         assert!(told.starts_with("what is to be unpacked of it takes more than 10 MiB on the disk"), "{told}");
-        let told = check_shared(6 << 30).unwrap_err().to_string();
-        assert!(told.ends_with("asks for 6 GiB of shared memory, and a recording gets at most 2 GiB"), "{told}");
-        assert_eq!(check_shared(2 << 30), Ok(()));
+        let told = within(6 << 30, 2 << 30).unwrap_err().to_string();
+        assert!(told.contains("asks for 6 GiB of shared memory, and a recording gets at most 2 GiB, half"), "{told}");
+        assert_eq!(within(2 << 30, 2 << 30), Ok(()));
+        assert_eq!(available_bytes("MemTotal: 8 kB\nMemAvailable:    2097152 kB\n"), Some(2 << 30));
+        assert_eq!(available_bytes(""), None);
+        check_shared(1 << 40).unwrap_err();
     }
 
     #[test]

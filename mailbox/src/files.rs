@@ -252,7 +252,8 @@ fn us() -> u32 {
 /// The folder around a path; none of a bare name.
 fn around(path: &Path) -> io::Result<Option<(&Path, Metadata)>> {
     let around = path.parent().filter(|around| !around.as_os_str().is_empty());
-    around.map(|around| Ok((around, fs::symlink_metadata(around)?))).transpose()
+    // The folder itself counts, also behind a link.
+    around.map(|around| Ok((around, fs::metadata(around)?))).transpose()
 }
 
 /// Removes a directory around nodes, if it is empty.

@@ -116,14 +116,17 @@ impl ParticipantProcess {
         has_ended(&self.pidfd, PollTimeout::ZERO)
     }
 
-    /// Whether it was started with a variable of this name in its environment.
+    /// What a variable of this name held in the environment that it was started with; none: there was none.
     ///
     /// # Errors
     /// When the kernel does not say.
-    pub fn was_given(&self, variable: &str) -> io::Result<bool> {
+    pub fn was_given(&self, variable: &str) -> io::Result<Option<String>> {
         let all = fs::read(self.folder.join("environ"))?;
-        let name = |entry: &[u8]| entry.strip_prefix(variable.as_bytes()).is_some_and(|rest| rest.starts_with(b"="));
-        Ok(all.split(|byte| *byte == 0).any(name))
+        let value = |entry: &[u8]| {
+            let value = entry.strip_prefix(variable.as_bytes())?.strip_prefix(b"=")?;
+            Some(String::from_utf8_lossy(value).into_owned())
+        };
+        Ok(all.split(|byte| *byte == 0).find_map(value))
     }
 
     /// Whether one of its open files holds the lock on this byte of the file with this device and number.
@@ -138,7 +141,10 @@ impl ParticipantProcess {
             };
             if told.lines().any(|line| is_lock_on(line, file.1, byte)) {
                 // The line has the device in another form than `stat`, on some file systems another device even.
-                let there = fs::metadata(self.folder.join("fd").join(entry.file_name()))?;
+                let there = match fs::metadata(self.folder.join("fd").join(entry.file_name())) {
+                    Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                    there => there?,
+                };
                 if (there.dev(), there.ino()) == file {
                     return Ok(true);
                 }
@@ -217,10 +223,10 @@ mod tests {
         let process = ParticipantProcess::open(other.0.id()).unwrap().unwrap();
         assert!(!process.has_ended());
         // Between fork and exec it still has our environment.
-        while !process.was_given("TOLD").unwrap() {
+        while process.was_given("TOLD").unwrap().is_none() {
             std::thread::yield_now();
         }
-        assert!(!process.was_given("TOL").unwrap() && !process.was_given("TOLD1").unwrap());
+        assert_eq!(["TOL", "TOLD1"].map(|name| process.was_given(name).unwrap()), [None, None]);
         process.kill().unwrap();
         assert_eq!(other.0.wait().unwrap().signal(), Some(libc::SIGKILL));
         assert!(process.has_ended());

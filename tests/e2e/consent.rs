@@ -115,18 +115,13 @@ fn a_recorded_command_is_shown_and_runs_when_the_user_says_so() {
 }
 
 #[test]
-fn a_journal_that_contradicts_its_recording_is_refused() {
+fn what_a_journal_names_that_contradicts_its_recording_is_not_run() {
     let place = Place::new();
     let file = recorded(&place);
     let text = std::fs::read_to_string(place.path("test.toml")).unwrap();
     let benign = text.replace("/bin/sh", "/opt/robot/seer");
     let other = with_configuration(&place, &file, &benign);
-    for said in [
-        exact(&place, &other, &[]),
-        exact(&place, &other, &["--run-recorded"]),
-        exact_by_own(&place, &other),
-        exact(&place, &other, &["--list"]),
-    ] {
+    for said in [exact(&place, &other, &[]), exact(&place, &other, &["--run-recorded"])] {
         let told = format!("{}{}", said.out, said.err);
         assert_plain(&["out", "err"], &told);
         let words = "the configuration in its journal is not the one that the recording says it was made with";
@@ -134,6 +129,10 @@ fn a_journal_that_contradicts_its_recording_is_refused() {
         assert!(!place.path("ran").exists(), "{told}");
     }
     assert_eq!(exact(&place, &other, &["--run-recorded"]).code, Some(1));
+    // The user's own program repeats it: a configuration may be edited before a module is restarted.
+    let own = exact_by_own(&place, &other).ok();
+    assert!(own.starts_with("seer.0: identical: ") && !place.path("ran").exists(), "{own}");
+    exact(&place, &other, &["--list"]).ok();
     std::fs::remove_file(&other).unwrap();
     let same = with_configuration(&place, &file, &text);
     let told = exact(&place, &same, &["--run-recorded"]).ok();

@@ -30,6 +30,7 @@ impl LocalConfiguration {
     /// Why nothing of it is run.
     pub(super) fn compared(&self, run: &RecordedRun, exact: &ExactRun) -> Result<RecordedCommand, String> {
         let (recorded, name) = run.readable(exact)?;
+        run.contradiction(&recorded).map_or(Ok(()), Err)?;
         let command = ModuleCommand::of(&recorded, name)?;
         let module = recorded.module(name).ok_or("the configuration does not have the module")?;
         let differences = self.differences(&run.module, module, &command);

@@ -53,7 +53,10 @@ pub(super) fn read(
     folder: &Path,
     quota: &mut UnpackedQuota,
 ) -> Result<Vec<RecordedRun>, Failure> {
-    let mut pieced = PiecedRuns::new(folder, quota, configurations(&[info(file)?]));
+    // Where the file does not tell, since its index is damaged, no configuration is the recorded one.
+    let untold = || Rc::new(BTreeSet::from([String::new()]));
+    let known = info(file).map_or_else(|_| untold(), |info| configurations(&[info]));
+    let mut pieced = PiecedRuns::new(folder, quota, known);
     let mut reader = Reader::open(file)?;
     let mut damage = None;
     loop {
@@ -195,13 +198,17 @@ impl RecordedRun {
         self.begins_late.clone().map_or_else(|| self.installation(exact), Err)
     }
 
-    /// The configuration as it was then, and the module: that of the channel. The journal has it from the module, the
-    /// recording from its recorder; a journal with another one than its recording was not written in that run.
+    /// Why what it names is not run: its configuration is not that of the recording. The journal has it from the
+    /// module, the recording from its recorder. Where only the user's own program runs, a module that was restarted
+    /// after its configuration was edited is repeated like any other.
+    pub(super) fn contradiction(&self, installation: &Installation) -> Option<String> {
+        let contradicts = !self.configurations.is_empty() && !self.configurations.contains(&installation.text);
+        contradicts.then(|| contradiction(&installation.text, &self.configurations))
+    }
+
+    /// The configuration as it was then, and the module: that of the channel.
     pub(super) fn installation(&self, exact: &ExactRun) -> Result<(Installation, Name), String> {
         let (installation, name) = exact.installation().map_err(|error| error.to_string())?;
-        if !self.configurations.is_empty() && !self.configurations.contains(&installation.text) {
-            return Err(contradiction(&installation.text, &self.configurations));
-        }
         let named = installation.classes.format(name);
         if named != self.module {
             return Err(format!("the journal that was recorded of {} is of another module: {named}", self.module));

@@ -62,7 +62,6 @@ impl ExactPrograms<'_> {
     }
 
     fn command(&self, run: &RecordedRun, exact: &ExactRun) -> Result<Command, String> {
-        // With a program of the user's, too, only a journal that is what it seems is repeated.
         let (installation, name) = run.installation(exact)?;
         let module = installation.module(name).ok_or("the configuration does not have the module")?;
         check_shared(module.memory()).map_err(|error| error.to_string())?;
@@ -72,7 +71,10 @@ impl ExactPrograms<'_> {
                 command.args(arguments);
                 Ok(command)
             }
-            ExactProgram::Recorded => ModuleCommand::of(&installation, name)?.prepared(),
+            ExactProgram::Recorded => {
+                run.contradiction(&installation).map_or(Ok(()), Err)?;
+                ModuleCommand::of(&installation, name)?.prepared()
+            }
         }
     }
 }

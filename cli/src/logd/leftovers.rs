@@ -3,7 +3,7 @@
 
 use nix::sys::statvfs::statvfs;
 use rohrpost::output::errno_of;
-use rohrpost_recording::{is_being_written, is_closed, recover as recovered, recovered_path};
+use rohrpost_recording::{PartFile, is_being_written, is_closed, recover as recovered, recovered_path};
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -87,6 +87,7 @@ fn make_whole(file: &Path, leave_bytes: u64) {
         );
         return;
     }
+    remove_unfinished(&recovered_path(file));
     match recovered(file, &recovered_path(file), &mut |_, _| {}) {
         Ok(made) => tracing::info!(
             "{name} was not closed: {} messages of it are in {}",
@@ -94,6 +95,17 @@ fn make_whole(file: &Path, leave_bytes: u64) {
             made.path.file_name().unwrap_or_default().to_string_lossy()
         ),
         Err(error) => tracing::error!(errno = errno_of(&error), "{name} was not closed, and is not recovered: {error}"),
+    }
+}
+
+/// Removes what recoveries of this file have left that were cut off themselves. These names are the recorder's own; one
+/// that is being written stays.
+fn remove_unfinished(whole: &Path) {
+    for part in PartFile::names(whole) {
+        let is_file = part.symlink_metadata().is_ok_and(|its| its.is_file());
+        if is_file && !is_being_written(&part) {
+            let _ = std::fs::remove_file(part);
+        }
     }
 }
 

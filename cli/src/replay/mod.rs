@@ -36,8 +36,9 @@ pub(crate) use player::run as play;
 use recorded::RecordedFiles;
 use rohrpost::launch::{Launch, events};
 use rohrpost::output::plain;
+use rohrpost::schema::Description;
 use rohrpost::wire::append;
-use rohrpost_config::Installation;
+use rohrpost_config::{Installation, StreamSpec};
 use session::ReplaySession;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -257,9 +258,19 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
     // One that the user names is the user's own word, and so are the streams that are named with --into.
     if arguments.config.is_none() && !recorded.are_others {
         let meant = |error| format!("{error}; if that is meant, name a configuration of your own: --config FILE");
-        check_shared(installation.memory_on(NODE)).map_err(meant)?;
+        check_shared(installation.memory_on(NODE).saturating_add(streams_memory(&installation, &played)))
+            .map_err(meant)?;
     }
     Ok(MadeReplay { installation, player, played })
+}
+
+/// Bytes of the streams that the player makes: one for each that a played module describes, of the size that the player
+/// has for streams of that name.
+fn streams_memory(installation: &Installation, played: &PlayedModules) -> u64 {
+    let players = || installation.modules.iter().filter(|module| module.node == NODE);
+    let sizes = |name: &str| players().filter_map(|module| module.streams.get(name)).map(StreamSpec::memory).max();
+    let names = played.described.values().flat_map(Description::streams).map(|item| &item.field.name);
+    names.map(|name| sizes(name).unwrap_or_else(|| StreamSpec::default().memory())).fold(0, u64::saturating_add)
 }
 
 /// The configuration that was recorded, or the one that is named; and where its paths begin. What the demo's

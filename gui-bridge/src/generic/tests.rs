@@ -56,7 +56,7 @@ fn long_lists_are_described() {
 
 #[test]
 fn wide_deep_and_long_data_are_bounded() {
-    let wide = Value::Map((0..500).map(|field| (format!("f{field}"), Value::U(field))).collect());
+    let wide = Value::Map((0..500).map(|field| (format!("f{field}").into(), Value::U(field))).collect());
     let flat = flatten(&wide);
     assert_eq!(flat.curves.len(), CURVES_MAX);
     assert!(flat.text.len() <= TEXT_MAX && flat.text.contains("f64: 64"));

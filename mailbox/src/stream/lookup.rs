@@ -18,6 +18,7 @@
 //! counts: it corrects those before it, also where one of them was answered already.
 
 use crate::stream::ring::{Line, Look, Ring, Stamp, TRIES};
+use std::ops::Range;
 
 /// The answer for a time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -53,15 +54,23 @@ pub(crate) fn around(ring: &Ring<'_>, at: Stamp, late_ns: u64) -> Answer {
     if line.about.stamp.epoch != at.epoch {
         return Answer::OtherEpoch { newest: newest.about.stamp.epoch };
     }
-    if line.about.before_ns >= at.ns {
+    if line.about.before_ns > at.ns {
         return lost(ring, at);
+    }
+    if line.about.before_ns == at.ns {
+        // The first of its stamp is gone; later ones count as well.
+        return match newest_of(ring, (low, &newest), at, late_ns) {
+            Some(line) if is_final(at.ns) => Answer::Around { before: line, after: line },
+            Some(_) => not_yet(at.ns),
+            None => lost(ring, at),
+        };
     }
     let Some((before, after)) = nearest(ring, line, end, at, late_ns) else { return lost(ring, at) };
     // No lost record could be nearer: the greatest stamp before the line is no less than any of theirs.
     let before = match (before, line.about.before_ns) {
         (Some(before), before_ns) if before.about.stamp.ns >= before_ns => Some(before),
         (_, 0) => None,
-        (_, before_ns) => newest_before(ring, low, &line, Stamp { ns: before_ns, ..at }),
+        (_, before_ns) => newest_before(ring, low..line.sequence, Stamp { ns: before_ns, ..at }),
     };
     match before {
         None if is_final(at.ns) => Answer::BeforeOldest { by_ns: after.about.stamp.ns - at.ns },
@@ -194,10 +203,21 @@ impl Left {
     }
 }
 
-/// Of the records of exactly this stamp, which the one that has passed it found as the greatest, the newest: mostly the
-/// one just before.
-fn newest_before(ring: &Ring<'_>, low: u64, passed: &Line, stamp: Stamp) -> Option<Line> {
-    for sequence in (low..passed.sequence).rev() {
+/// The newest record of exactly this stamp, of which the first has been overwritten.
+fn newest_of(ring: &Ring<'_>, (low, newest): (u64, &Line), stamp: Stamp, late_ns: u64) -> Option<Line> {
+    let end = newest.sequence + 1;
+    let beyond = first_reached(ring, (low, newest), Stamp { ns: stamp.ns.saturating_add(1), ..stamp });
+    let passed = if let Look::There(passed) = beyond { Some(passed) } else { None };
+    let late = passed.filter(|passed| passed.about.stamp.epoch == stamp.epoch);
+    let late = late.and_then(|passed| nearest(ring, passed, end, stamp, late_ns)?.0);
+    let before = || newest_before(ring, low..passed.map_or(end, |passed| passed.sequence), stamp);
+    late.filter(|line| line.about.stamp == stamp).or_else(before)
+}
+
+/// Of the records of exactly this stamp in this part, behind which it is passed, the newest: mostly the last. At most
+/// all of the part are looked at, where many came late.
+fn newest_before(ring: &Ring<'_>, part: Range<u64>, stamp: Stamp) -> Option<Line> {
+    for sequence in part.rev() {
         match ring.look(sequence) {
             Look::There(line) if line.about.stamp == stamp => return Some(line),
             Look::There(line) if line.reached() < stamp => return None,
@@ -334,7 +354,10 @@ mod tests {
                 }
                 Answer::NotYet { .. } => assert!(!is_final, "of {asked:?}: it never comes"),
                 Answer::BeforeOldest { .. } => {
-                    let is_there = before.is_some_and(|before| lost_ns.is_none_or(|lost| before > lost));
+                    let is_exact = |before| before == asked.ns && there.contains(&asked);
+                    let is_there = before.is_some_and(|before| {
+                        lost_ns.is_none_or(|lost| before > lost || before == lost && is_exact(before))
+                    });
                     assert!(!is_there, "of {asked:?}: {before:?} is there");
                 }
                 Answer::Empty | Answer::OtherEpoch { .. } => panic!("of {asked:?}: {answer:?} of {there:?}"),
@@ -343,20 +366,23 @@ mod tests {
     }
 
     #[test]
-    fn of_records_with_one_stamp_the_newest_counts() {
+    fn of_records_with_one_stamp_the_newest_counts_also_when_the_first_is_overwritten() {
         let memory = Memory::default();
         let ring = memory.ring();
         let mut progress = Progress::resume(&ring);
-        for ns in [90, 100, 100, 100, 110, 110] {
-            let about = about(Stamp { epoch: 1, ns });
+        let mut write = |ns| {
             let frame = progress.claim(&ring).unwrap();
-            progress.publish(&ring, frame, about, |_| (), |_, _| ());
-        }
-        for (asked, expected) in [(95, (0, 3)), (100, (3, 3)), (105, (3, 5)), (110, (5, 5))] {
-            let Answer::Around { before, after } = around(&ring, Stamp { epoch: 1, ns: asked }, 0) else {
-                panic!("{asked} has records around it");
-            };
-            assert_eq!((before.sequence, after.sequence), expected, "of {asked}");
+            progress.publish(&ring, frame, about(Stamp { epoch: 1, ns }), |_| (), |_, _| ());
+        };
+        let answer = |ns| match around(&ring, Stamp { epoch: 1, ns }, 0) {
+            Answer::Around { before, after } => (before.sequence, after.sequence),
+            other => panic!("{ns}: {other:?}"),
+        };
+        [90, 100, 100, 100, 110, 110].into_iter().for_each(&mut write);
+        assert_eq!([95, 100, 105, 110].map(answer), [(0, 3), (3, 3), (3, 5), (5, 5)]);
+        for sequence in 6..6 + 2 * KEEP as u64 {
+            write(120);
+            assert_eq!(answer(120), (sequence, sequence));
         }
     }
 

@@ -37,17 +37,30 @@ impl PartFile {
         if to.symlink_metadata().is_ok() {
             return Err(RewriteError::Exists(Shown(to.to_owned())));
         }
-        let mut number = 1;
-        loop {
-            let mut part = to.as_os_str().to_owned();
-            part.push(if number == 1 { ".part".to_owned() } else { format!(".{number}.part") });
-            let part = PathBuf::from(part);
+        let mut taken = None;
+        for part in Self::names(to) {
             match make(&part) {
                 Ok(file) => return Ok((Self { part, to: to.to_owned(), is_renamed: false }, file)),
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && number < NAMES_MAX => number += 1,
-                Err(error) => return Err(DiskError::new("make the file", &part, error).into()),
+                Err(error) => {
+                    let is_taken = error.kind() == io::ErrorKind::AlreadyExists;
+                    taken = Some(DiskError::new("make the file", &part, error));
+                    if !is_taken {
+                        break;
+                    }
+                }
             }
         }
+        let none = || DiskError::new("make the file", to, io::ErrorKind::AlreadyExists.into());
+        Err(taken.unwrap_or_else(none).into())
+    }
+
+    /// Names that a new file may have until it is whole, in the order in which they are tried.
+    pub fn names(to: &Path) -> impl Iterator<Item = PathBuf> {
+        (1..=NAMES_MAX).map(|number| {
+            let mut part = to.as_os_str().to_owned();
+            part.push(if number == 1 { ".part".to_owned() } else { format!(".{number}.part") });
+            part.into()
+        })
     }
 
     /// Where it is until then.

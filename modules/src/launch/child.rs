@@ -273,7 +273,7 @@ impl Child {
         self.note_switch(node);
         if let Some(process) = &mut self.process {
             process.find_module(node);
-            match process.end() {
+            match process.end(node) {
                 Ok(Some(status)) => {
                     self.process = None;
                     self.over = Some((status, now));
@@ -295,13 +295,13 @@ impl Child {
             Phase::Starting if self.state_of(node).is_some_and(is_ready) => self.phase = Phase::Ready,
             Phase::Starting if now - self.since > self.ready_within => {
                 let within = self.ready_within;
-                self.process.iter().for_each(ModuleProcess::kill);
+                self.process.iter().for_each(|process| process.kill(node));
                 // For its end, and then as its policy has it.
                 self.phase = Phase::Waiting;
                 return Some(format!("{} was not ready within {within:?}; killed", self.text));
             }
             Phase::Waiting if self.may_spawn(now) => return self.spawn(node, now),
-            Phase::Stopping => return self.press(now),
+            Phase::Stopping => return self.press(node, now),
             Phase::Ready | Phase::Running => return self.note_busy(node, now),
             _ => {}
         }

@@ -52,7 +52,7 @@ impl LaunchShutdown {
         self.told = 0;
         let kill = |child: &mut Child| {
             child.tell_to_end(Then::End, node, now);
-            child.force(now).then(|| child.text().to_owned())
+            child.force(node, now).then(|| child.text().to_owned())
         };
         let killed: Vec<String> = children.iter_mut().filter_map(kill).collect();
         (!killed.is_empty()).then(|| format!("told to stop a second time; killed at once: {}", killed.join(", ")))

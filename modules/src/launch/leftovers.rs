@@ -89,11 +89,18 @@ impl Leftovers<'_> {
             Ok(process) => process?,
             Err(why) => return refused(NotStarted::Unknown(why)),
         };
-        match process.was_given(environment::LAUNCHER) {
-            Ok(true) => Some(Ok((module, process))),
-            Ok(false) => refused(NotStarted::ByHand(found.pid)),
-            Err(_) if process.has_ended() => None,
-            Err(error) => refused(NotStarted::Unknown(ProcessError::Untold(error))),
+        // The launcher's variable alone is inherited by what a module starts, such as a shell.
+        let given = [environment::LAUNCHER, environment::MODULE].map(|name| process.was_given(name));
+        let [launcher, named] = match given {
+            [Ok(launcher), Ok(named)] => [launcher, named],
+            [Err(error), _] | [_, Err(error)] if !process.has_ended() => {
+                return refused(NotStarted::Unknown(ProcessError::Untold(error)));
+            }
+            _ => return None,
+        };
+        match launcher {
+            Some(_) if named.as_ref() == Some(&module) => Some(Ok((module, process))),
+            _ => refused(NotStarted::ByHand(found.pid)),
         }
     }
 }

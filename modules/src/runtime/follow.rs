@@ -2,14 +2,13 @@
 
 use super::refusals::Cause;
 use super::subscribed::{Origin, Subscribed, seal};
+use super::wanted::WantedData;
 use crate::call::append;
 use crate::call::{CallError, Fault, Link, is_to};
 use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
-use crate::description::noted;
-use crate::output::plain;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Head, Name, Node, Options};
-use rohrpost_schema::{Data, Type, describe_type};
+use rohrpost_schema::Data;
 use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -94,12 +93,6 @@ impl<T> Subscription<T> {
     pub(crate) fn new(id: u16, mailbox: u8) -> Self {
         Self { id, mailbox, data: PhantomData }
     }
-}
-
-/// What a program knows of the data that it subscribes to.
-pub(crate) struct WantedData {
-    pub(crate) name: &'static str,
-    pub(crate) ty: Type,
 }
 
 /// One thing that is followed.
@@ -293,7 +286,14 @@ impl Followed {
             error,
             CallError::NotSent(_)
                 | CallError::Timeout(..)
-                | CallError::Fault(_, Fault::NoMailbox | Fault::NodeSilent { .. })
+                | CallError::Fault(
+                    _,
+                    Fault::NoMailbox
+                        | Fault::MailboxFull
+                        | Fault::Expired
+                        | Fault::Interrupted
+                        | Fault::NodeSilent { .. }
+                )
         );
         let text = error.to_string();
         if self.refusal.as_ref() == Some(&text) {
@@ -301,8 +301,16 @@ impl Followed {
         }
         // The module is named before.
         let why = if let CallError::Fault(_, fault) = &error { fault.to_string() } else { text.clone() };
-        let told = format!("subscription to {}: {why}{}", self.what(installation), self.difference(&error, node));
+        let told = format!(
+            "subscription to {}: {why}{}",
+            self.what(installation),
+            self.wanted
+                .as_ref()
+                .map_or_else(String::new, |wanted| { wanted.difference(&error, node, (self.from, self.wish.number)) })
+        );
         if passes {
+            // Whether what it was refused for still holds is not known any more.
+            self.complaint = None;
             tracing::debug!("{told}");
         } else {
             tracing::warn!("{told}");
@@ -317,25 +325,6 @@ impl Followed {
         match &self.wanted {
             Some(wanted) => format!("`{}` of {module}", wanted.name),
             None => format!("data {} of {module}", self.wish.number),
-        }
-    }
-
-    /// What differs between the data that the module has and those that are wanted, if that is known here.
-    fn difference(&self, error: &CallError, node: &Node) -> String {
-        let CallError::Fault(_, Fault::InterfaceDiffers { .. }) = error else { return String::new() };
-        let (Some(WantedData { name, ty }), Some(there)) = (&self.wanted, noted(node, self.from)) else {
-            return String::new();
-        };
-        match there.data.iter().find(|item| item.number == self.wish.number) {
-            None => format!("; it has no data of number {} any more", self.wish.number),
-            Some(item) if item.field.ty != *ty => format!(
-                "; there, number {} is `{}: {}`; this program takes `{name}: {}`",
-                self.wish.number,
-                plain::line(&item.field.name),
-                describe_type(&item.field.ty),
-                describe_type(ty)
-            ),
-            Some(_) => format!("; `{name}` itself is the same in both"),
         }
     }
 }

@@ -76,6 +76,10 @@ impl<M: MadeModule> Incarnation<M> {
 
     pub(super) fn enter(&mut self, state: ModuleState) {
         self.state = state;
+        if state != ModuleState::On {
+            // Its subscriptions rest.
+            self.complains(None);
+        }
         self.participant.set_state(state);
     }
 

@@ -32,6 +32,7 @@ mod stream;
 mod subscribed;
 mod time_teller;
 mod unreadable;
+mod wanted;
 
 pub use clock::ModuleClock;
 pub use context::Context;

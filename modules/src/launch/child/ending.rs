@@ -1,6 +1,5 @@
 //! A process on its way to its end, because somebody wants it so.
 
-use super::process::ModuleProcess;
 use super::{Child, Phase, Repeats};
 use crate::launch::leftovers::KILL_TIME;
 use rohrpost_mailbox::Node;
@@ -76,7 +75,7 @@ impl Child {
             self.turn_on = self.configured_on;
         }
         if self.process.is_some() || self.over.is_some() {
-            self.process.iter().for_each(|process| process.terminate(node));
+            self.process.iter_mut().for_each(|process| process.terminate(node));
             self.phase = Phase::Stopping;
             self.ending = Some(ChildShutdown { then, since: now, killed: None, left_behind: false });
         } else if then == Then::Start {
@@ -87,12 +86,12 @@ impl Child {
     }
 
     /// Sees to it that a process that was told to end does.
-    pub(super) fn press(&mut self, now: Instant) -> Option<String> {
+    pub(super) fn press(&mut self, node: &Node, now: Instant) -> Option<String> {
         let (within, pid) = (self.stop_within, self.pid()?);
         let ending = self.ending.as_mut()?;
         match ending.killed {
             None if now >= ending.press_at(within)? => {
-                self.force(now);
+                self.force(node, now);
                 Some(format!("{} did not stop within {within:?}; killed", self.text))
             }
             Some(_) if now >= ending.press_at(within)? => {
@@ -105,11 +104,11 @@ impl Child {
     }
 
     /// Kills a process that was told to end; false when there is none, or it was killed before.
-    pub(in crate::launch) fn force(&mut self, now: Instant) -> bool {
+    pub(in crate::launch) fn force(&mut self, node: &Node, now: Instant) -> bool {
         let Some(ending) = self.ending.as_mut().filter(|ending| ending.killed.is_none()) else { return false };
         ending.killed = Some(now);
         // A stopped process obeys this one too.
-        self.process.iter().for_each(ModuleProcess::kill);
+        self.process.iter().for_each(|process| process.kill(node));
         true
     }
 

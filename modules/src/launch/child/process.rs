@@ -11,7 +11,7 @@
 
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
-use rohrpost_mailbox::{Name, Node, ParticipantInfo, sys};
+use rohrpost_mailbox::{Name, Node, ParticipantInfo, ParticipantProcess, ProcessError, sys};
 use std::io;
 use std::process::{Child, ExitStatus};
 
@@ -61,19 +61,29 @@ impl ModuleProcess {
         node.last_word_of(self.name, self.pid()).filter(|word| word.joined_after(self.before))
     }
 
-    /// Asks the module to end, and nobody around it: a shell would end at once, and leave the module alone.
-    pub(super) fn terminate(&self, node: &Node) {
-        let is_within = |word: &ParticipantInfo| word.pid != self.started.id();
-        let within = self.last_word(node).filter(is_within).and_then(|word| node.process_of(&word).ok().flatten());
+    /// The module's process, if it is another one than launch has started.
+    fn within(&self, node: &Node) -> Result<Option<ParticipantProcess>, ProcessError> {
+        let word = self.last_word(node).filter(|word| word.pid != self.started.id());
+        word.map_or(Ok(None), |word| node.process_of(&word))
+    }
+
+    /// Asks the module to end, and nobody around it: a shell would end at once, and leave the module alone. Where the
+    /// kernel does not tell which process it is, all of the group are asked.
+    pub(super) fn terminate(&mut self, node: &Node) {
+        self.find_module(node);
         // What has ended meanwhile needs no signal.
-        let _ = match within {
-            Some(module) => module.terminate(),
-            None => kill(self.number(), Signal::SIGTERM).map_err(io::Error::from),
+        let _ = match self.within(node) {
+            Ok(Some(module)) => module.terminate(),
+            Ok(None) => kill(self.number(), Signal::SIGTERM).map_err(io::Error::from),
+            Err(_) => killpg(self.number(), Signal::SIGTERM).map_err(io::Error::from),
         };
     }
 
-    /// Kills the whole group.
-    pub(super) fn kill(&self) {
+    /// Kills the whole group, and the module if it has left it: `timeout` makes a group of its own.
+    pub(super) fn kill(&self, node: &Node) {
+        if let Ok(Some(module)) = self.within(node) {
+            let _ = module.kill();
+        }
         let _ = killpg(self.number(), Signal::SIGKILL);
     }
 
@@ -81,11 +91,11 @@ impl ModuleProcess {
     ///
     /// # Errors
     /// When somebody else has asked for its end.
-    pub(super) fn end(&mut self) -> io::Result<Option<ExitStatus>> {
+    pub(super) fn end(&mut self, node: &Node) -> io::Result<Option<ExitStatus>> {
         if sys::ended_child(Some(self.started.id()))?.is_none() {
             return Ok(None);
         }
-        self.kill();
+        self.kill(node);
         self.started.try_wait()
     }
 

@@ -5,7 +5,8 @@ use crate::common::DataHead;
 use crate::interface::DataPort;
 use crate::journal::{Question, Tag, nanoseconds};
 use crate::runtime::error::ContextError;
-use crate::runtime::follow::{Rate, Subscription, WantedData};
+use crate::runtime::follow::{Rate, Subscription};
+use crate::runtime::wanted::WantedData;
 use rohrpost_mailbox::{CreateError, Head, Name, OverflowPolicy, Shape, local};
 use rohrpost_schema::Data;
 

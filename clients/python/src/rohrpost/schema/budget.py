@@ -5,7 +5,7 @@ from __future__ import annotations
 
 EMPTY_MAX = 65_536
 """Values that take no bytes, in one message."""
-VALUES_MAX = 1_000_000
+VALUES_MAX = 4_000_000
 """Values in one message that are objects of their own here, of some 100 bytes each: lists, structs and all that is in
 them, but for the contents of ``bytes`` and texts, and for numbers in a list of f32 or f64."""
 VALUES_PER_BYTE = 8
