@@ -164,7 +164,8 @@ fn connections_are_answered_line_by_line_and_none_holds_the_recorder_up() {
         (&[b'x'; 100_000], "ERR the line is too long"),
         (page.as_bytes(), "ERR no command `POST`"),
         (b"EHLO robot\r\n", "ERR no command `EHLO`"),
-        (b"\x16\x03\x01\x00\xf4\x01\n", "ERR the line has control characters"),
+        (b"\x16\x03\x01\x00\xf4\x01\n", "ERR the line is not in UTF-8"),
+        (b"\x16\x03\x01\x00\x74\x01\n", "ERR the line has control characters"),
     ] {
         let mut other = ControlConnection::open(address);
         other.say(&[said, b"off\n"].concat());
@@ -230,7 +231,7 @@ fn a_connection_that_chatters_takes_no_answers_from_the_command_line() {
         });
         let told: Vec<_> = (0..8).map(|_| place.say(&["record", "rotate", "--timeout", "60"])).collect();
         ends.store(true, Ordering::Relaxed);
-        assert!(chatter.join().unwrap() > 64, "or nothing was tried");
+        assert!(chatter.join().unwrap() >= 40, "or nothing was tried");
         told.into_iter().for_each(|told| drop(told.ok()));
     });
     drop(robot);

@@ -40,6 +40,7 @@ use rohrpost::schema::Description;
 use rohrpost::wire::append;
 use rohrpost_config::{Installation, StreamSpec};
 use session::ReplaySession;
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -264,13 +265,20 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
     Ok(MadeReplay { installation, player, played })
 }
 
-/// Bytes of the streams that the player makes: one for each that a played module describes, of the size that the player
-/// has for streams of that name.
+/// Bytes of the streams that the player makes besides those in its configuration: one for each that a played module
+/// describes, of the size that the player has for streams of that name.
 fn streams_memory(installation: &Installation, played: &PlayedModules) -> u64 {
     let players = || installation.modules.iter().filter(|module| module.node == NODE);
     let sizes = |name: &str| players().filter_map(|module| module.streams.get(name)).map(StreamSpec::memory).max();
     let names = played.described.values().flat_map(Description::streams).map(|item| &item.field.name);
-    names.map(|name| sizes(name).unwrap_or_else(|| StreamSpec::default().memory())).fold(0, u64::saturating_add)
+    let (mut counted, mut bytes) = (BTreeSet::new(), 0_u64);
+    for name in names {
+        let known = sizes(name);
+        if known.is_none() || !counted.insert(name) {
+            bytes = bytes.saturating_add(known.unwrap_or_else(|| StreamSpec::default().memory()));
+        }
+    }
+    bytes
 }
 
 /// The configuration that was recorded, or the one that is named; and where its paths begin. What the demo's
