@@ -71,10 +71,16 @@ impl Printed {
     }
 }
 
-/// A shell that runs tests in the background has them ignore Ctrl-C, and their children, too. Python would go on then.
-fn heeding_control_c(command: &mut Command) {
-    // SAFETY: between fork and exec it makes a system call, and no handler is replaced that anybody waits for.
-    let heed = || unsafe { signal(Signal::SIGINT, SigHandler::SigDfl) }.map(drop).map_err(Into::into);
+/// A shell that runs tests in the background has them ignore Ctrl-C, `nohup` a terminal that goes, and their children
+/// do, too: what is started here would go on then.
+fn heeding_signals(command: &mut Command) {
+    let heed = || {
+        for number in [Signal::SIGINT, Signal::SIGHUP] {
+            // SAFETY: a system call between fork and exec; no handler is replaced that anybody waits for.
+            unsafe { signal(number, SigHandler::SigDfl) }?;
+        }
+        Ok(())
+    };
     // SAFETY: as above.
     unsafe { command.pre_exec(heed) };
 }
@@ -95,7 +101,7 @@ pub(crate) fn without_real_time(command: &mut Command) {
 
 impl Running {
     pub(crate) fn start(mut command: Command) -> Self {
-        heeding_control_c(&mut command);
+        heeding_signals(&mut command);
         let mut child = command.spawn().unwrap();
         let (out, err) = (Printed::read(child.stdout.take()), Printed::read(child.stderr.take()));
         Self { child, out, err }
