@@ -18,7 +18,7 @@ const PAGE: &str = include_str!("../../docs/src/shared-memory.md");
 /// Where the parts of a mailbox and their fields are told.
 const PARTS: &str = "## A mailbox";
 const FIELDS: &str = "### Identity, owner, hot";
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 
 /// The offset that a section's table gives for a field: the first of the row's cells that begins with its name tells.
 fn at(section: &str, field: &str) -> usize {
@@ -392,6 +392,7 @@ fn a_stream_is_as_documented() {
     assert_eq!(["length", "incarnation"].map(|field| there.u32(entry + at(ENTRY, field))), [8, info.incarnation]);
     assert_eq!(there.u64(hints + 74 % 70 * 8), 1_000_074, "the hint");
     assert_eq!(u64::from(there.u32(seats + at(SEAT, "hold"))), frame + 1);
+    assert_eq!(there.u32(seats + at(SEAT, "name of the module")), Name::new(1, 200, 7, 0).raw());
     assert_eq!(["sleeper", "passed over"].map(|field| there.u64(seats + at(SEAT, field))), [0, 0]);
     assert_eq!(there.0.len(), shape.segment_bytes());
 }

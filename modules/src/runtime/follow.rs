@@ -352,7 +352,8 @@ mod tests {
     #[test]
     fn only_what_was_asked_for_in_this_life_is_taken() {
         let mut followings = Followings::of(LIFE, {
-            let text = "installation = \"test\"\nsystem = 1\n[nodes.main]\n[classes.laser]\nid = 150\n";
+            let text = "installation = \"one\"\nsystem = { name = \"robot\", id = 1 }\n[classes.tool]\nid = 16\n\
+                        [classes.laser]\nid = 150\n[nodes.main]\n[[module]]\nname = \"laser.0\"\nprogram = \"laser\"\n";
             Arc::new(Installation::parse(text, std::path::Path::new("robot.toml")).unwrap())
         });
         for (mailbox, from, number) in [(2, LASER, 1), (3, LASER, 1), (2, WHEELS, 1), (2, LASER, 2)] {
