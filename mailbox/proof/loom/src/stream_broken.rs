@@ -284,7 +284,10 @@ pub(crate) const BROKEN: &[Broken] = &[
     ),
     broken(
         "stream_any_record_before_will_do",
-        &[edit("stream/lookup", "if line.about.stamp == stamp =>", "if line.about.stamp <= stamp =>")],
+        &[
+            edit("stream/lookup", "(ring, low..line.sequence, Stamp", "(ring, low..line.sequence + 1, Stamp"),
+            edit("stream/lookup", "if line.about.stamp == stamp =>", "if line.about.stamp.epoch == stamp.epoch =>"),
+        ],
         "an_overwritten_look_says_so",
         "not the nearest",
     ),
