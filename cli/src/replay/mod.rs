@@ -128,7 +128,8 @@ struct RepeatArguments {
         "run", "names", "into", "from", "until", "rate", "repeats", "paused", "viewer", "no_gui", "quiet",
     ])]
     exact: bool,
-    /// With --exact: this program runs, with the arguments behind `--`, and no word of the recording.
+    /// With --exact: this program runs, with the arguments behind `--`, and no word of the recorded command. It is
+    /// given the settings that were recorded: which files and devices they name, `record info --json` shows.
     #[arg(long, value_name = "PATH", requires = "exact", conflicts_with_all = ["config", "list"])]
     program: Option<PathBuf>,
     /// The arguments of --program.
