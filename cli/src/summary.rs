@@ -133,7 +133,7 @@ pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
     table_of(&all, rows)
 }
 
-/// The same for the live table: rates; aliases in lines below their module; below all, the last errors.
+/// Modules as the live table has them: rates; aliases in lines below their module; below all, the last errors.
 pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
     let rate = |line: &ModuleLine| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}"));
     let alias = |alias: &String| std::array::from_fn(|at| if at == 0 { format!("+ {alias}") } else { String::new() });
