@@ -10,7 +10,7 @@ pub(super) fn table<const N: usize>(heads: [&str; N], rows: impl IntoIterator<It
     table_of(&heads, rows)
 }
 
-/// A plain table with a number of columns known at run time. Foreign text stays in its line; a terminal is not exceeded.
+/// A plain table with a number of columns known at run time. Foreign text stays in its line; on a terminal it fits.
 pub(super) fn table_of<R: Into<Vec<String>>>(heads: &[impl AsRef<str>], rows: impl IntoIterator<Item = R>) -> String {
     fitted(heads, rows, columns())
 }
