@@ -2,6 +2,7 @@
 
 mod json;
 mod memory;
+mod recorded;
 
 use super::{daemons, doctor};
 use crate::terminal::{Failure, say};
@@ -65,6 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let missing = missing_programs(&installation, only)?;
     let mut notes = separated_by_size(&installation);
+    notes.extend(recorded::too_large(&installation));
     notes.extend(daemons_here(&installation, Path::new("/proc")));
     let base = base_directory();
     let room = doctor::room_of_nodes(&base);

@@ -7,7 +7,7 @@ use crate::units::size;
 use rohrpost::output::plain::ForeignText;
 use rohrpost::schema::describe_type;
 use rohrpost_recording::format::PROFILE;
-use rohrpost_recording::{ChannelInfo, Damage, Info, Shown};
+use rohrpost_recording::{AttachmentInfo, ChannelInfo, Damage, Info, Shown};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -76,6 +76,10 @@ fn text(info: &Info) -> String {
     if !info.session.is_empty() {
         lines.push(session.collect::<Vec<_>>().join(", "));
     }
+    lines.extend(info.attachments.iter().map(|its| {
+        let AttachmentInfo { name, media_type, bytes } = its;
+        format!("attachment {name}: {media_type}, {}", size(*bytes))
+    }));
     lines.extend(info.marks.iter().map(|mark| format!("mark at {}: {}", stamp_text(mark.time_ns), mark.text)));
     if !info.described.is_empty() {
         let names: BTreeSet<&ForeignText> = info.described.iter().map(|module| &module.name).collect();
@@ -152,6 +156,10 @@ fn as_json(info: &Info) -> Value {
     );
     let damages = info.damages.iter().map(|(at, what)| json!({"at": at, "what": what.to_string()}));
     let marks = info.marks.iter().map(|its| json!({"time_ns": its.time_ns, "epoch": its.epoch, "text": its.text}));
+    let attachments = info
+        .attachments
+        .iter()
+        .map(|its| json!({"name": its.name, "media_type": its.media_type, "bytes": its.bytes}));
     let described = info.described.iter().map(|module| {
         let description = &module.description;
         json!({"name": module.name, "class": description.class, "interface": format!("{:08x}", description.hash())})
@@ -164,7 +172,7 @@ fn as_json(info: &Info) -> Value {
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
         "earlier_configuration": info.earlier_configuration,
-        "marks": marks.collect::<Vec<_>>(), "described": described.collect::<Vec<_>>(),
+        "attachments": attachments.collect::<Vec<_>>(), "marks": marks.collect::<Vec<_>>(), "described": described.collect::<Vec<_>>(),
         "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),
         "damage_count": info.damage_count,
     })

@@ -112,9 +112,13 @@ impl PlayedChannels {
     }
 }
 
-/// When a message was made. Other programs may not say, and write 0: then it is when it arrived.
+/// When a message was made. Other programs may not say, and write 0: then it is when it arrived. Their time may begin
+/// with 0, which a stream takes for no time.
 fn stamp_of(message: &Message<'_>, is_opaque: bool) -> u64 {
-    if is_opaque && message.stamp_ns == 0 { message.arrival_ns } else { message.stamp_ns }
+    match message.stamp_ns {
+        0 if is_opaque => message.arrival_ns.max(1),
+        stamp_ns => stamp_ns,
+    }
 }
 
 /// Postcard of bytes: their count, seven bits a byte, and they themselves.
@@ -134,6 +138,16 @@ mod tests {
     use super::*;
     use rohrpost::schema::Bytes;
     use rohrpost::wire::from_bytes;
+
+    #[test]
+    fn time_that_begins_with_0_is_a_time() {
+        for (stamp_ns, arrival_ns, is_opaque, wanted) in
+            [(0, 0, true, 1), (0, 7, true, 7), (5, 7, true, 5), (0, 7, false, 0)]
+        {
+            let message = Message { arrival_ns, stamp_ns, epoch: 0, sequence: 0, data: &[] };
+            assert_eq!(stamp_of(&message, is_opaque), wanted, "{stamp_ns} {arrival_ns}");
+        }
+    }
 
     #[test]
     fn messages_of_others_are_bytes() {

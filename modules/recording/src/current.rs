@@ -5,7 +5,6 @@ use crate::described::DescribedModule;
 use crate::disk::Disk;
 use crate::drawn::DrawingBeside;
 use crate::error::DiskError;
-use crate::file::OpenFile;
 use crate::format::{
     CHUNK_BYTES_MAX, MESSAGE_ENCODING, MESSAGE_OVERHEAD_BYTES, SCHEMA_ENCODING, VERSION, key, metadata, session_key,
 };
@@ -14,6 +13,7 @@ use crate::options::{Options, Session};
 use crate::order::Mark;
 use crate::read::definitions::{Definition, SchemaText};
 use crate::status::ChannelState;
+use crate::write::file::OpenFile;
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -79,8 +79,8 @@ impl Current {
         about.insert("format".into(), VERSION.to_string());
         about.insert("node".into(), session.node.clone());
         about.insert("file".into(), number.to_string());
-        self.file.metadata(metadata::SESSION, about)?;
-        self.file.metadata(metadata::CONFIGURATION, session.configuration.clone())?;
+        self.file.metadata(metadata::SESSION, &about)?;
+        self.file.metadata(metadata::CONFIGURATION, &session.configuration)?;
         self.file.end_chunk()
     }
 
@@ -132,7 +132,7 @@ impl Current {
             return Ok(());
         }
         for module in &modules[self.modules..] {
-            self.file.metadata(metadata::DESCRIPTION, module.texts())?;
+            self.file.metadata(metadata::DESCRIPTION, &module.texts())?;
         }
         self.modules = modules.len();
         self.end_chunk()
@@ -171,8 +171,8 @@ impl Current {
         let id = self.file.channel(schema, topic, MESSAGE_ENCODING, &texts)?;
         if let Some(drawing) = self.drawing.as_mut().filter(|drawing| !drawing.knows(id)) {
             let schema = Arc::new(SchemaText::new(schema_name.clone(), SCHEMA_ENCODING.into(), data.clone()));
-            drawing
-                .add(id, Definition { topic: topic.clone(), message_encoding: MESSAGE_ENCODING.into(), texts, schema });
+            let (topic, message_encoding) = (topic.clone(), MESSAGE_ENCODING.into());
+            drawing.add(id, Definition { topic, message_encoding, texts, schema, ..Definition::default() });
         }
         Ok(id)
     }
@@ -184,7 +184,7 @@ impl Current {
         self.add(&header, data)?;
         let Some(drawing) = &mut self.drawing else { return Ok(()) };
         for drawn in drawing.draw(channel_id, publish_time, data) {
-            let Definition { topic, message_encoding, texts, schema } = &*drawn.channel;
+            let Definition { topic, message_encoding, texts, schema, .. } = &*drawn.channel;
             let schema = self.file.schema(&schema.name, &schema.encoding, &schema.data)?;
             let channel_id = self.file.channel(schema, topic, message_encoding, texts)?;
             self.add(&MessageHeader { channel_id, ..header }, &drawn.data)?;
@@ -209,7 +209,7 @@ impl Current {
 
     /// Sets a mark, behind what is written.
     pub(crate) fn mark(&mut self, mark: &Mark) -> Result<(), DiskError> {
-        self.file.metadata(metadata::MARK, mark.texts())?;
+        self.file.metadata(metadata::MARK, &mark.texts())?;
         self.end_chunk()?;
         self.marks += 1;
         Ok(())
@@ -228,7 +228,7 @@ impl Current {
         self.epoch = Some(epoch);
         let texts = [("epoch", epoch), ("arrival-ns", arrival_ns)];
         let texts = texts.into_iter().map(|(key, number)| (key.to_owned(), number.to_string()));
-        self.file.metadata(metadata::EPOCH, texts.collect())
+        self.file.metadata(metadata::EPOCH, &texts.collect())
     }
 
     /// Tells losses that are not told yet.
@@ -245,7 +245,7 @@ impl Current {
             .filter(|(_, count)| *count > 0)
             .map(|(channel, count)| (channel.topic.clone(), count.to_string()))
             .collect();
-        self.file.metadata(metadata::LOST, texts)?;
+        self.file.metadata(metadata::LOST, &texts)?;
         self.file.end_chunk()?;
         self.lost_told = lost;
         Ok(())

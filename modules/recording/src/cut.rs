@@ -1,8 +1,9 @@
 //! A part of a recording: a time range, some names.
 
 use crate::error::{ReadError, RewriteError};
-use crate::format::metadata;
+use crate::format::{header_of_made, metadata};
 use crate::read::before::newest_before;
+use crate::read::contents::Contents;
 use crate::read::selected::Selected;
 use crate::rewrite::{Progress, Rewriter};
 use crate::selection::{SelectError, Selection};
@@ -31,6 +32,8 @@ const EARLIER: usize = 1;
 /// Writes what is selected to a new file; its messages and bytes. Reads only the chunks that have some of it. Counts of
 /// lost messages remain those of the whole file.
 ///
+/// All attachments are kept, and of a file that another program wrote its metadata and its profile.
+///
 /// The new file begins with the newest message of each selected topic from before the time range, as each file of a
 /// recording does. They do not count as its messages.
 ///
@@ -38,10 +41,15 @@ const EARLIER: usize = 1;
 /// When the file was not closed or is damaged, has no such name, or the new one cannot be written.
 pub fn cut(path: &Path, to: &Path, selection: &Selection, progress: &mut Progress<'_>) -> Result<(u64, u64), CutError> {
     let mut selected = Selected::open(path, selection)?;
-    let mut new = Rewriter::create(to)?;
-    selected
-        .each_metadata(|its| Ok::<_, CutError>(new.metadata(&its.name, its.metadata).map_err(RewriteError::from)?))?;
-    new.metadata(metadata::CUT, selection.about(path)).map_err(RewriteError::from)?;
+    let mut new = Rewriter::create(to, &header_of_made([Contents::header_of(path)?.as_ref()]))?;
+    selected.each_metadata(new.keeps_theirs(), |its| {
+        Ok::<_, CutError>(new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?)
+    })?;
+    for attachment in selected.take_attachments() {
+        let at = attachment.index.offset;
+        new.attachment::<CutError>(path, attachment)?.map_err(|what| selected.damaged(at, what))?;
+    }
+    new.metadata(metadata::CUT, &selection.about(path)).map_err(RewriteError::from)?;
     for (id, channel) in selected.channels() {
         new.channel(SELECTED, id, channel).map_err(RewriteError::from)?;
     }

@@ -1,6 +1,7 @@
 //! What goes wrong on the disk and in files.
 
-use crate::format::DESCRIBED_BYTES_MAX;
+use crate::format::{DESCRIBED_BYTES_MAX, RECORD_BYTES_MAX};
+use crate::read::ordered::HELD_BYTES_MAX;
 use rohrpost_schema::plain::{self, ForeignText};
 use std::fmt;
 use std::io;
@@ -179,6 +180,22 @@ pub enum FileLimit {
         DESCRIBED_BYTES_MAX >> 20
     )]
     Described,
+    /// A record of the file.
+    #[error("a record of {0} bytes; records of up to {mib} MiB are read", mib = RECORD_BYTES_MAX >> 20)]
+    Record(u64),
+    /// A chunk, before compression.
+    #[error(
+        "a chunk of {0} bytes before compression; chunks of up to {mib} MiB are read: have them written smaller",
+        mib = RECORD_BYTES_MAX >> 20
+    )]
+    Chunk(u64),
+    /// Messages that are so far out of order that too many wait for their turn.
+    #[error(
+        "its messages are so far out of order that more than {} MiB of them would wait for their turn, which is the \
+         limit; sort it (`mcap sort`), or play a part of it",
+        HELD_BYTES_MAX >> 20
+    )]
+    Disorder,
 }
 
 /// How a part of a file is damaged.
@@ -187,7 +204,13 @@ pub enum Damage {
     /// The file ends inside of a record.
     #[error("the file ends inside of a record")]
     Cut,
-    /// A record that MCAP does not have, or longer than any here.
+    /// A byte of what each file begins with.
+    #[error("the file does not begin as an MCAP file does, but for one byte")]
+    Magic,
+    /// More than is read here: it may be whole.
+    #[error(transparent)]
+    Limit(FileLimit),
+    /// A record that MCAP does not have, or that does not end where it says.
     #[error("no record begins here (type {op}, {len} bytes)")]
     NoRecord {
         /// Its first byte.
@@ -207,6 +230,9 @@ pub enum Damage {
     /// Checked by sum.
     #[error("the checksum of the summary is wrong")]
     SummarySum,
+    /// Checked by sum.
+    #[error("the checksum of an attachment is wrong")]
+    AttachmentSum,
     /// Bytes that do not unpack.
     #[error("a chunk cannot be decompressed")]
     Compression,

@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 /// The header's profile.
 pub const PROFILE: &str = "rohrpost";
 /// Library in the header of each file, before its version.
-pub(crate) const LIBRARY: &str = "rohrpost-recording/";
+const LIBRARY: &str = "rohrpost-recording/";
+/// Behind the library of another program, in a file that is made of its file.
+const BY_WAY_OF: &str = ", by way of ";
 /// How messages are encoded.
 pub const MESSAGE_ENCODING: &str = "postcard";
 /// How types are described: bytes of `rohrpost-schema`'s `Type`, by the table in `docs/src/wire.md`.
@@ -18,8 +20,9 @@ pub const VERSION: u32 = 1;
 pub const CHUNK_BYTES_MAX: usize = 1 << 20;
 /// A message. Longer ones are refused.
 pub const MESSAGE_BYTES_MAX: usize = 16 << 20;
-/// A record, and a chunk before compression. In files, longer ones are damage.
-pub(crate) const RECORD_BYTES_MAX: usize = MESSAGE_BYTES_MAX + (4 << 20);
+/// A record that is read, and a chunk before compression: others write long ones. A reader has some of them in memory at
+/// once.
+pub(crate) const RECORD_BYTES_MAX: usize = 128 << 20;
 /// Memory for the descriptions of types, channels and modules in one file. Those of a robot take some megabytes.
 pub(crate) const DESCRIBED_BYTES_MAX: usize = 256 << 20;
 /// What a message takes besides its data: type, length, channel, sequence and two times.
@@ -70,6 +73,8 @@ pub mod key {
     /// Of a channel with what came last before the file, from an earlier one, as a beginning: `true`. The log time of
     /// its messages is that of the file's first message, the publish time is the stamp.
     pub const REPEATED: &str = "repeated";
+    /// The same as [`REPEATED`] in a file of another program, where that key means something else.
+    pub(crate) const REPEATED_OF_OTHERS: &str = "rohrpost.repeated";
     /// Of a channel that was drawn of another one, for other programs: the topic of that.
     pub const DRAWN: &str = "drawn";
     /// Of a drawn channel with fewer pixels or points than what was recorded, so that nothing long is in a file twice:
@@ -88,9 +93,11 @@ pub(crate) mod op {
     pub(crate) const MESSAGE_INDEX: u8 = 7;
     pub(crate) const CHUNK_INDEX: u8 = 8;
     pub(crate) const ATTACHMENT: u8 = 9;
+    pub(crate) const ATTACHMENT_INDEX: u8 = 10;
     pub(crate) const STATISTICS: u8 = 11;
     pub(crate) const METADATA: u8 = 12;
     pub(crate) const METADATA_INDEX: u8 = 13;
+    pub(crate) const SUMMARY_OFFSET: u8 = 14;
     pub(crate) const DATA_END: u8 = 15;
 }
 
@@ -105,6 +112,34 @@ pub(crate) fn is_our_word(name: &str) -> bool {
 /// Whether a file is of another program, by its header. Our words mean nothing there.
 pub(crate) fn is_of_others(header: &Header) -> bool {
     header.profile != PROFILE && !header.library.starts_with(LIBRARY)
+}
+
+/// The header of our files.
+pub(crate) fn our_header() -> Header {
+    Header { profile: PROFILE.to_owned(), library: our_library() }
+}
+
+fn our_library() -> String {
+    format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION"))
+}
+
+/// The header of a file that is made of others. What only other programs wrote stays theirs: their profile, or none if
+/// they have several, and their words.
+pub(crate) fn header_of_made<'a>(old: impl IntoIterator<Item = Option<&'a Header>>) -> Header {
+    let mut made: Option<Header> = None;
+    for header in old {
+        let Some(header) = header.filter(|header| is_of_others(header)) else { return our_header() };
+        let library = match header.library.split(BY_WAY_OF).next() {
+            None | Some("") => "unknown",
+            Some(library) => library,
+        };
+        let library = || format!("{library}{BY_WAY_OF}{}", our_library());
+        let made = made.get_or_insert_with(|| Header { profile: header.profile.clone(), library: library() });
+        if made.profile != header.profile {
+            made.profile.clear();
+        }
+    }
+    made.unwrap_or_else(our_header)
 }
 
 /// The topic of an item.

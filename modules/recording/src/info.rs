@@ -6,10 +6,10 @@ use crate::error::{Damage, ReadError};
 use crate::format::{self, key, metadata};
 use crate::order::Mark;
 use crate::read::contents::{Contents, Ending, Item};
-use crate::read::definitions::{Definition, Definitions};
+use crate::read::definitions::{ChannelIdentity, Definition};
 use crate::read::frames::Frames;
 use crate::read::index::{Index, times_at};
-use mcap::records::Metadata;
+use mcap::records::{AttachmentIndex, Metadata};
 use rohrpost_schema::Type;
 use rohrpost_schema::plain::ForeignText;
 use std::collections::{BTreeMap, BTreeSet};
@@ -62,13 +62,26 @@ pub struct Info {
     pub earlier_configuration: BTreeSet<(String, String)>,
     /// Marks that were set, in the order of the file.
     pub marks: Vec<Mark>,
+    /// Files in it, as other programs put them there.
+    pub attachments: Vec<AttachmentInfo>,
     /// Modules of which something is recorded, each interface of them once.
     pub described: Vec<DescribedModule>,
     /// What else the file says of itself: `rohrpost.recovered`, `rohrpost.cut`, `rohrpost.merged`, and others'.
     pub others: Vec<(ForeignText, ForeignTexts)>,
 }
 
-/// One topic of a file.
+/// A file in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AttachmentInfo {
+    /// Its name.
+    pub name: ForeignText,
+    /// Its kind, as mail has it: `text/plain`.
+    pub media_type: ForeignText,
+    /// Its length.
+    pub bytes: u64,
+}
+
+/// One topic of a file; several if it has values of several types.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelInfo {
     /// Name and item.
@@ -114,6 +127,13 @@ pub struct EpochInfo {
     pub messages: u64,
 }
 
+impl AttachmentInfo {
+    fn of(index: AttachmentIndex) -> Self {
+        let AttachmentIndex { name, media_type, data_size: bytes, .. } = index;
+        Self { name: name.into(), media_type: media_type.into(), bytes }
+    }
+}
+
 impl Info {
     /// Name and text of each configuration that the file says it was made with.
     pub fn configurations(&self) -> impl Iterator<Item = (&str, &str)> {
@@ -140,7 +160,9 @@ impl Info {
 pub fn info(path: &Path) -> Result<Info, ReadError> {
     let mut frames = Frames::open(path)?;
     match Index::read(&mut frames) {
-        Ok(index) if index.knows_all_channels() && index.knows_times() => from_index(frames, &index),
+        Ok(index) if index.knows_all_channels() && index.knows_times() && index.lists_what_is_no_message() => {
+            from_index(frames, index)
+        }
         Ok(_) | Err(ReadError::NotClosed { .. }) => from_all(path),
         Err(error) => Err(error),
     }
@@ -166,14 +188,16 @@ fn wider(one: Option<(u64, u64)>, other: Option<(u64, u64)>) -> Option<(u64, u64
     }
 }
 
-fn from_index(mut frames: Frames, index: &Index) -> Result<Info, ReadError> {
-    let counts = &index.statistics.channel_message_counts;
+fn from_index(mut frames: Frames, index: Index) -> Result<Info, ReadError> {
+    let Index { definitions, chunks, metadata, attachments, statistics, .. } = index;
+    let statistics = statistics.unwrap_or_default();
+    let counts = &statistics.channel_message_counts;
     let mut tallies: BTreeMap<u16, Tally> =
         counts.iter().map(|(id, messages)| (*id, Tally { messages: *messages, times: None })).collect();
     // The first chunk of each channel has its first message, the last one its last; in between only a step of time
     // reaches further, which the file's own times show.
     let mut ends: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
-    for (id, at) in index.chunks.iter().flat_map(|chunk| &chunk.message_index_offsets) {
+    for (id, at) in chunks.iter().flat_map(|chunk| &chunk.message_index_offsets) {
         ends.entry(*id).or_insert((*at, *at)).1 = *at;
     }
     for (id, (first, last)) in ends {
@@ -181,18 +205,19 @@ fn from_index(mut frames: Frames, index: &Index) -> Result<Info, ReadError> {
         tally.widen(times_at(&mut frames, first)?);
         tally.widen(times_at(&mut frames, last)?);
     }
-    let mut contents = Contents::new(frames, index.definitions.clone());
-    let mut about = Vec::new();
-    for at in &index.metadata {
-        about.push(contents.metadata_at(at.offset)?);
+    let mut contents = Contents::new(frames, definitions);
+    let mut about = About::default();
+    for at in metadata {
+        about.metadata.push(contents.metadata_at(at.offset)?);
     }
+    about.attachments = attachments;
     contents.read_header()?;
-    let mut info = build(&contents, &index.definitions, &tallies, about)?;
+    let mut info = build(&contents, &tallies, about)?;
     info.is_closed = true;
-    info.chunks = index.chunks.len() as u64;
+    info.chunks = chunks.len() as u64;
     if info.messages > 0 {
-        info.first_ns = Some(index.statistics.message_start_time);
-        info.last_ns = Some(index.statistics.message_end_time);
+        info.first_ns = Some(statistics.message_start_time);
+        info.last_ns = Some(statistics.message_end_time);
     }
     Ok(info)
 }
@@ -200,7 +225,7 @@ fn from_index(mut frames: Frames, index: &Index) -> Result<Info, ReadError> {
 fn from_all(path: &Path) -> Result<Info, ReadError> {
     let mut contents = Contents::open(path)?;
     let mut tallies: BTreeMap<u16, Tally> = BTreeMap::new();
-    let (mut about, mut damages) = (Vec::new(), Damages::default());
+    let (mut about, mut damages) = (About::default(), Damages::default());
     while let Some(item) = contents.next()? {
         match item {
             Item::Message(found) => {
@@ -208,23 +233,27 @@ fn from_all(path: &Path) -> Result<Info, ReadError> {
                 tally.messages += 1;
                 tally.widen(Some((found.header.log_time, found.header.log_time)));
             }
-            Item::Metadata(metadata) => about.push(metadata),
+            Item::Metadata(metadata) => about.metadata.push(metadata),
+            Item::Attachment(attachment) => about.attachments.push(attachment.index),
             Item::Damaged(at, damage) => damages.note(at, damage),
         }
     }
-    let mut info = build(&contents, contents.definitions(), &tallies, about)?;
+    let mut info = build(&contents, &tallies, about)?;
     info.is_closed = contents.ending() == Some(Ending::Closed);
     info.chunks = contents.chunks();
     (info.damages, info.damage_count) = (damages.listed, damages.count);
     Ok(info)
 }
 
-fn build(
-    contents: &Contents,
-    definitions: &Definitions,
-    tallies: &BTreeMap<u16, Tally>,
-    about: Vec<Metadata>,
-) -> Result<Info, ReadError> {
+/// What a file says besides its messages.
+#[derive(Default)]
+struct About {
+    metadata: Vec<Metadata>,
+    attachments: Vec<AttachmentIndex>,
+}
+
+fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> Result<Info, ReadError> {
+    let definitions = contents.definitions();
     let mut info = Info {
         path: contents.path().to_owned(),
         bytes: contents.file_bytes(),
@@ -246,11 +275,12 @@ fn build(
         configuration: BTreeMap::new(),
         earlier_configuration: BTreeSet::new(),
         marks: Vec::new(),
+        attachments: about.attachments.into_iter().map(AttachmentInfo::of).collect(),
         described: Vec::new(),
         others: Vec::new(),
     };
     let (mut lost, mut memory) = (BTreeMap::new(), definitions.memory());
-    for its in about {
+    for its in about.metadata {
         let is_heeded = contents.heeds(&its);
         let Metadata { name, metadata: mut texts } = its;
         match name.as_str() {
@@ -273,13 +303,18 @@ fn build(
             _ => info.others.push((name.into(), foreign(texts))),
         }
     }
-    let mut channels: BTreeMap<&str, ChannelInfo> = BTreeMap::new();
+    let mut channels: Vec<ChannelInfo> = Vec::new();
+    let mut places: BTreeMap<ChannelIdentity<'_>, usize> = BTreeMap::new();
     let mut epochs: BTreeMap<u64, Tally> = BTreeMap::new();
     let mut times = None;
     for (id, channel) in definitions.channels() {
         let tally = tallies.get(&id);
         let (messages, its_times) = tally.map_or((0, None), |tally| (tally.messages, tally.times));
-        let told = channels.entry(&channel.topic).or_default();
+        let place = *places.entry(channel.identity()).or_insert(channels.len());
+        if place == channels.len() {
+            channels.push(ChannelInfo::default());
+        }
+        let told = &mut channels[place];
         describe(told, channel);
         if channel.is_repeated() {
             told.repeated = told.repeated.saturating_add(messages);
@@ -294,16 +329,20 @@ fn build(
             tally.widen(its_times);
         }
     }
+    // Those of one topic stay in the order of the file.
+    channels.sort_by(|one, other| one.topic.cmp(&other.topic));
     for (topic, count) in &lost {
-        let channel = channels.entry(topic).or_default();
-        channel.topic = topic.as_str().into();
-        channel.lost = *count;
+        let at = channels.partition_point(|channel| *channel.topic < **topic);
+        if channels.get(at).is_none_or(|channel| *channel.topic != **topic) {
+            channels.insert(at, ChannelInfo { topic: topic.as_str().into(), ..ChannelInfo::default() });
+        }
+        channels[at].lost = *count;
     }
     (info.first_ns, info.last_ns) = times.unzip();
     info.lost = sum(lost.values().copied());
-    info.messages = sum(channels.values().map(|channel| channel.messages));
-    info.repeated = sum(channels.values().map(|channel| channel.repeated));
-    info.channels = channels.into_values().collect();
+    info.channels = channels;
+    info.messages = sum(info.channels.iter().map(|channel| channel.messages));
+    info.repeated = sum(info.channels.iter().map(|channel| channel.repeated));
     let epoch_info = |(epoch, Tally { messages, times }): (u64, Tally)| {
         let (first_ns, last_ns) = times.unzip();
         EpochInfo { epoch, first_ns, last_ns, messages }

@@ -66,7 +66,7 @@ mod described;
 mod disk;
 mod drawn;
 mod error;
-mod file;
+
 pub mod format;
 mod inbox;
 mod info;
@@ -74,7 +74,7 @@ mod merge;
 mod newest;
 mod options;
 mod order;
-mod output;
+
 mod part_file;
 mod player;
 mod read;
@@ -89,6 +89,7 @@ mod shared;
 mod status;
 #[cfg(test)]
 mod tests;
+mod write;
 mod writer;
 
 pub use batch::Message;
@@ -98,7 +99,7 @@ pub use described::DescribedModule;
 pub use disk::is_being_written;
 pub use drawn::{DrawError, DrawOptions, Drawn, DrawnBeside, draw};
 pub use error::{Damage, DiskError, FileLimit, ReadError, RewriteError, Shown};
-pub use info::{ChannelInfo, EpochInfo, ForeignTexts, Info, info};
+pub use info::{AttachmentInfo, ChannelInfo, EpochInfo, ForeignTexts, Info, info};
 pub use merge::{MergeError, merge};
 pub use newest::Earlier;
 pub use options::{Options, Session};

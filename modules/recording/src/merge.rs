@@ -1,11 +1,11 @@
 //! Several files in one, by time of arrival.
 
 use crate::error::{ReadError, RewriteError, Shown};
-use crate::format::{self, key, metadata};
+use crate::format::{self, header_of_made, is_our_word, key, metadata};
 use crate::read::contents::{Contents, Ending, Found, Item};
-use crate::read::definitions::{Definition, Definitions, SchemaText};
+use crate::read::definitions::{Definition, SchemaText};
 use crate::read::frames::Frames;
-use crate::read::index::Index;
+use crate::read::outline::Outline;
 use crate::rewrite::{Progress, Rewriter};
 use mcap::records::Metadata;
 use rohrpost_schema::plain::ForeignText;
@@ -55,10 +55,12 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
     if paths.is_empty() {
         return Err(MergeError::Nothing);
     }
-    let types = check_types(paths)?;
-    let mut new = Rewriter::create(to)?;
+    let headers = paths.iter().map(|path| Contents::header_of(path)).collect::<Result<Vec<_>, _>>()?;
+    let mut new = Rewriter::create(to, &header_of_made(headers.iter().map(Option::as_ref)))?;
+    // Channels of others may have one topic and different types.
+    let types = if new.keeps_theirs() { BTreeMap::new() } else { check_types(paths)? };
     let names = paths.iter().enumerate().map(|(at, path)| (format!("{:04}", at + 1), file_name(path)));
-    new.metadata(metadata::MERGED, names.collect()).map_err(RewriteError::from)?;
+    new.metadata(metadata::MERGED, &names.collect()).map_err(RewriteError::from)?;
     let sources = paths.iter().enumerate().map(|(number, path)| Source::open(number, path, &mut new));
     let mut sources = sources.collect::<Result<Vec<_>, _>>()?;
     let mut written = Written::default();
@@ -80,7 +82,7 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
     }
     if !lost.is_empty() {
         let texts = lost.into_iter().map(|(topic, count)| (topic, count.to_string()));
-        new.metadata(metadata::LOST, texts.collect()).map_err(RewriteError::from)?;
+        new.metadata(metadata::LOST, &texts.collect()).map_err(RewriteError::from)?;
     }
     let messages = new.messages();
     Ok((messages, new.finish()?))
@@ -151,8 +153,16 @@ impl Source {
                     return Ok(());
                 }
                 Item::Damaged(at, what) => return Err(self.contents.damaged(at, what).into()),
-                Item::Metadata(its) if !self.contents.heeds(&its) => {}
-                Item::Metadata(its) => self.tell(its, new)?,
+                Item::Metadata(its) if self.contents.heeds(&its) => self.tell(its, new)?,
+                Item::Metadata(its) if new.keeps_theirs() => {
+                    new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?;
+                }
+                Item::Metadata(_) => {}
+                Item::Attachment(attachment) => {
+                    let at = attachment.index.offset;
+                    let told = new.attachment::<MergeError>(self.contents.path(), attachment)?;
+                    told.map_err(|what| self.contents.damaged(at, what))?;
+                }
             }
         }
         match self.contents.ending() {
@@ -167,10 +177,11 @@ impl Source {
         match its.name.as_str() {
             metadata::LOST => self.lost = format::counts(&texts),
             metadata::CLOSED => {}
-            metadata::CONFIGURATION => new.metadata(&its.name, texts)?,
+            metadata::CONFIGURATION => new.metadata(&its.name, &texts)?,
+            name if !is_our_word(name) => new.metadata(name, &texts)?,
             name => {
                 texts.entry("source".into()).or_insert_with(|| file_name(self.contents.path()));
-                new.metadata(name, texts)?;
+                new.metadata(name, &texts)?;
             }
         }
         Ok(())
@@ -181,7 +192,7 @@ impl Source {
 fn check_types(paths: &[PathBuf]) -> Result<BTreeMap<String, Arc<SchemaText>>, MergeError> {
     let mut types: BTreeMap<String, (Arc<SchemaText>, &Path)> = BTreeMap::new();
     for path in paths {
-        let definitions: Definitions = Index::read(&mut Frames::open(path)?)?.definitions;
+        let Outline { definitions, .. } = Outline::read(&mut Frames::open(path)?)?;
         for (_, Definition { topic, schema, .. }) in definitions.channels().map(|(id, channel)| (id, &**channel)) {
             let (known, first) = types.entry(topic.clone()).or_insert_with(|| (schema.clone(), path));
             if !known.is_same_type(schema) {

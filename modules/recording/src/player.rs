@@ -159,7 +159,7 @@ impl Player {
         let Some(path) = self.files.get(self.ended) else { return Ok(false) };
         self.ended += 1;
         self.reader = None;
-        let reader = Reader::open(path)?;
+        let reader = Reader::to_play(path)?;
         let recording = recording_of(path);
         self.is_other = matches!((&self.recording, &recording), (Some(before), Some(now)) if before != now);
         if self.is_other {

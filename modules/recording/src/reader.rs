@@ -2,18 +2,20 @@
 
 use crate::batch::Message;
 use crate::error::ReadError;
-use crate::format::key;
+use crate::format::{is_of_others, key};
 use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::Definition;
 use crate::read::frames::Frames;
 use crate::read::index::Index;
+use crate::read::ordered::{OrderedBatch, TimePlan};
 use crate::read::selected::Selected;
 use crate::selection::{SelectError, Selection};
 use rohrpost_schema::Type;
 use rohrpost_schema::plain::ForeignText;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::Receiver;
 
 /// A channel, as a file describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +82,28 @@ enum ReaderSource {
     /// From its beginning on.
     Whole(Contents),
     Part(Selected),
+    /// In the order of time.
+    InTime(ReaderInTime),
+}
+
+/// Messages that a thread puts in the order of time.
+struct ReaderInTime {
+    path: PathBuf,
+    plan: TimePlan,
+    batches: Receiver<Result<OrderedBatch, ReadError>>,
+    batch: OrderedBatch,
+    file_bytes: u64,
+}
+
+impl ReaderInTime {
+    fn next(&mut self) -> Result<Option<Found>, ReadError> {
+        if self.batch.found.is_empty() {
+            // Its thread has ended behind the last one.
+            let Ok(told) = self.batches.recv() else { return Ok(None) };
+            self.batch = told?;
+        }
+        Ok(self.batch.found.pop_front())
+    }
 }
 
 impl Reader {
@@ -97,6 +121,19 @@ impl Reader {
     /// When it is no MCAP file, was not closed, or has no such name.
     pub fn select(path: &Path, selection: &Selection) -> Result<Self, SelectError> {
         Ok(Self::of(ReaderSource::Part(Selected::open(path, selection)?)))
+    }
+
+    /// As [`Self::open`], to be played: messages of another program's file come in the order of time, which need not be
+    /// that of the file. In ours, time steps where it stepped while it was recorded.
+    pub(crate) fn to_play(path: &Path) -> Result<Self, ReadError> {
+        if !Contents::header_of(path)?.is_some_and(|header| is_of_others(&header)) {
+            return Self::open(path);
+        }
+        let plan = TimePlan::of(path)?;
+        let batches = plan.read(path, 0)?;
+        let file_bytes = Frames::open(path)?.len();
+        let (path, batch) = (path.to_owned(), OrderedBatch::default());
+        Ok(Self::of(ReaderSource::InTime(ReaderInTime { path, plan, batches, batch, file_bytes })))
     }
 
     fn of(source: ReaderSource) -> Self {
@@ -120,9 +157,16 @@ impl Reader {
     /// # Errors
     /// As of [`Self::next`].
     pub fn seek(&mut self, arrival_ns: u64) -> Result<bool, ReadError> {
-        if let ReaderSource::Whole(contents) = &mut self.source {
-            *contents = contents.at_first_chunk(|chunk| chunk.message_end_time >= arrival_ns)?;
-            self.is_ahead = false;
+        match &mut self.source {
+            ReaderSource::Whole(contents) => {
+                *contents = contents.at_first_chunk(|chunk| chunk.message_end_time >= arrival_ns)?;
+                self.is_ahead = false;
+            }
+            ReaderSource::InTime(its) => {
+                (its.batches, its.batch) = (its.plan.read(&its.path, arrival_ns)?, OrderedBatch::default());
+                self.is_ahead = false;
+            }
+            ReaderSource::Part(_) => {}
         }
         loop {
             self.advance()?;
@@ -141,7 +185,7 @@ impl Reader {
     pub(crate) fn read_ahead(&mut self) -> Result<(), ReadError> {
         match &mut self.source {
             ReaderSource::Whole(contents) => contents.read_ahead(),
-            ReaderSource::Part(_) => Ok(()),
+            ReaderSource::Part(_) | ReaderSource::InTime(_) => Ok(()),
         }
     }
 
@@ -174,6 +218,7 @@ impl Reader {
         match &self.source {
             ReaderSource::Whole(contents) => (contents.at(), contents.file_bytes()),
             ReaderSource::Part(selected) => (selected.at(), selected.file_bytes()),
+            ReaderSource::InTime(its) => (its.batch.read_bytes, its.file_bytes),
         }
     }
 
@@ -183,6 +228,7 @@ impl Reader {
         match &self.source {
             ReaderSource::Whole(contents) => contents.ending() == Some(Ending::Closed),
             ReaderSource::Part(_) => true,
+            ReaderSource::InTime(its) => its.plan.is_closed(),
         }
     }
 }
@@ -192,12 +238,13 @@ impl ReaderSource {
         let contents = match self {
             Self::Whole(contents) => contents,
             Self::Part(selected) => return selected.next(),
+            Self::InTime(its) => return its.next(),
         };
         while let Some(item) = contents.next()? {
             match item {
                 Item::Message(found) => return Ok(Some(found)),
                 Item::Damaged(at, what) => return Err(contents.damaged(at, what)),
-                Item::Metadata(_) => {}
+                Item::Metadata(_) | Item::Attachment(_) => {}
             }
         }
         Ok(None)
@@ -207,6 +254,7 @@ impl ReaderSource {
         match self {
             Self::Whole(contents) => contents.data(found),
             Self::Part(selected) => selected.data(found),
+            Self::InTime(its) => found.data_in(&its.batch.data),
         }
     }
 }

@@ -3,8 +3,11 @@
 use crate::damages::Damages;
 use crate::disk::is_being_written;
 use crate::error::{Damage, ReadError, RewriteError, Shown};
-use crate::format::metadata;
+use crate::format::{header_of_made, metadata};
 use crate::read::contents::{Contents, Ending, Item};
+use crate::read::definitions::Definitions;
+use crate::read::frames::Frames;
+use crate::read::index::Index;
 use crate::rewrite::{Progress, Rewriter};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -56,7 +59,8 @@ pub fn recovered_path(path: &Path) -> PathBuf {
 /// Makes a whole file of what is readable, at `to`. The old file stays as it is.
 ///
 /// All messages before a cut are in it, and none that was not there. A chunk with a wrong checksum is left out, and
-/// reading goes on behind it; where no record can be found any more, it ends.
+/// reading goes on behind it; behind a damaged type or length of a record, where the next one is found. Of a file that
+/// another program wrote, its attachments, its metadata and its profile stay.
 ///
 /// # Errors
 /// When the old file is no MCAP file, or is being written, or the new one cannot be written.
@@ -64,8 +68,17 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
     if is_being_written(path) {
         return Err(RecoverError::BeingWritten(Shown(path.to_owned())));
     }
-    let mut contents = Contents::open(path)?;
-    let mut new = Rewriter::create(to)?;
+    let mut frames = Frames::open(path)?;
+    // What the index describes need not be readable at its place.
+    let known = match Index::read(&mut frames) {
+        Ok(index) if index.is_checked => index.definitions,
+        Err(error @ ReadError::Io { .. }) => return Err(error.into()),
+        Ok(_) | Err(_) => Definitions::default(),
+    };
+    let header = Contents::header_of(path)?;
+    frames.seek(mcap::MAGIC.len() as u64)?;
+    let mut contents = Contents::new(frames, known);
+    let mut new = Rewriter::create(to, &header_of_made([header.as_ref()]))?;
     let (mut damages, mut unchecked) = (Damages::default(), 0);
     while let Some(item) = contents.next()? {
         progress(contents.at(), contents.file_bytes());
@@ -74,9 +87,15 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
                 unchecked += u64::from(found.is_unchecked);
                 new.message(0, &found.channel, &found.header, contents.data(&found)).map_err(RewriteError::from)?;
             }
-            Item::Metadata(metadata) if !contents.heeds(&metadata) => {}
+            Item::Metadata(metadata) if !contents.heeds(&metadata) && !new.keeps_theirs() => {}
             Item::Metadata(metadata) => {
-                new.metadata(&metadata.name, metadata.metadata).map_err(RewriteError::from)?;
+                new.metadata(&metadata.name, &metadata.metadata).map_err(RewriteError::from)?;
+            }
+            Item::Attachment(attachment) => {
+                let at = attachment.index.offset;
+                if let Err(damage) = new.attachment::<RecoverError>(path, attachment)? {
+                    damages.note(at, damage);
+                }
             }
             Item::Damaged(at, damage) => damages.note(at, damage),
         }
@@ -96,7 +115,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
         ("unchecked", unchecked.to_string()),
     ];
     let about: BTreeMap<String, String> = about.into_iter().map(|(key, text)| (key.to_owned(), text)).collect();
-    new.metadata(metadata::RECOVERED, about).map_err(RewriteError::from)?;
+    new.metadata(metadata::RECOVERED, &about).map_err(RewriteError::from)?;
     let messages = new.messages();
     let bytes = new.finish()?;
     Ok(Recovered {

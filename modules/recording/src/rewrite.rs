@@ -1,12 +1,13 @@
 //! A new file from what others have. It gets its name once it is whole.
 
 use crate::disk::{Disk, RealDisk};
-use crate::error::{DiskError, RewriteError};
-use crate::file::OpenFile;
-use crate::format::{CHUNK_BYTES_MAX, MESSAGE_OVERHEAD_BYTES};
+use crate::error::{Damage, DiskError, ReadError, RewriteError};
+use crate::format::{CHUNK_BYTES_MAX, MESSAGE_OVERHEAD_BYTES, is_of_others, key};
 use crate::part_file::PartFile;
+use crate::read::attachment::Attachment;
 use crate::read::definitions::Definition;
-use mcap::records::MessageHeader;
+use crate::write::file::OpenFile;
+use mcap::records::{Header, MessageHeader};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -24,14 +25,28 @@ pub(crate) struct Rewriter {
     channels: BTreeMap<(usize, u16), u16>,
     chunk_bytes: usize,
     messages: u64,
+    /// It says that it is of another program: what that wrote under words of ours stays.
+    keeps_theirs: bool,
 }
 
 impl Rewriter {
     /// Begins one.
-    pub(crate) fn create(to: &Path) -> Result<Self, RewriteError> {
+    pub(crate) fn create(to: &Path, header: &Header) -> Result<Self, RewriteError> {
         let (part, made) = PartFile::create(to, |path| RealDisk.create(path))?;
-        let file = OpenFile::begin(&mut RealDisk, part.path(), made)?;
-        Ok(Self { file: Some(file), part: Some(part), channels: BTreeMap::new(), chunk_bytes: 0, messages: 0 })
+        let file = OpenFile::begin(&mut RealDisk, part.path(), made, header)?;
+        Ok(Self {
+            file: Some(file),
+            part: Some(part),
+            channels: BTreeMap::new(),
+            chunk_bytes: 0,
+            messages: 0,
+            keeps_theirs: is_of_others(header),
+        })
+    }
+
+    /// Whether it is of another program, as what it is made of: all that one wrote goes on meaning what it means there.
+    pub(crate) fn keeps_theirs(&self) -> bool {
+        self.keeps_theirs
     }
 
     /// Messages so far, without those that are repeated from an earlier file.
@@ -39,10 +54,29 @@ impl Rewriter {
         self.messages
     }
 
-    pub(crate) fn metadata(&mut self, name: &str, texts: BTreeMap<String, String>) -> Result<(), DiskError> {
+    pub(crate) fn metadata(&mut self, name: &str, texts: &BTreeMap<String, String>) -> Result<(), DiskError> {
         let Some(file) = &mut self.file else { return Ok(()) };
         self.chunk_bytes = 0;
         file.metadata(name, texts)
+    }
+
+    /// Copies an attachment of this file, if it is whole.
+    pub(crate) fn attachment<E: From<ReadError> + From<RewriteError>>(
+        &mut self,
+        path: &Path,
+        attachment: Attachment,
+    ) -> Result<Result<(), Damage>, E> {
+        let Some(file) = &mut self.file else { return Ok(Ok(())) };
+        let mut parts = match attachment.open(path)? {
+            Ok(parts) => parts,
+            Err(damage) => return Ok(Err(damage)),
+        };
+        self.chunk_bytes = 0;
+        file.begin_attachment(parts.index.clone(), parts.bytes()).map_err(RewriteError::from)?;
+        while let Some(part) = parts.next()? {
+            file.attachment_part(part).map_err(RewriteError::from)?;
+        }
+        Ok(Ok(()))
     }
 
     /// Whether it is described.
@@ -56,12 +90,21 @@ impl Rewriter {
             return Ok(*known);
         }
         let Some(file) = &mut self.file else { return Ok(id) };
-        let Definition { topic, message_encoding, texts, schema } = &**channel;
+        let Definition { topic, message_encoding, texts, unheeded, schema } = &**channel;
         let schema = match schema.encoding.as_str() {
             "" => 0,
             encoding => file.schema(&schema.name, encoding, &schema.data)?,
         };
-        let new = file.channel(schema, topic, message_encoding, texts)?;
+        let new = if self.keeps_theirs {
+            let ours = texts.iter().map(|(key, text)| match key.as_str() {
+                key::REPEATED => (key::REPEATED_OF_OTHERS.to_owned(), text.clone()),
+                _ => (key.clone(), text.clone()),
+            });
+            let texts = ours.chain(unheeded.clone()).collect();
+            file.channel(schema, topic, message_encoding, &texts)?
+        } else {
+            file.channel(schema, topic, message_encoding, texts)?
+        };
         self.channels.insert((source, id), new);
         Ok(new)
     }

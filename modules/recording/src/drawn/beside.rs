@@ -95,7 +95,7 @@ mod tests {
         let data = Image::<Bytes>::schema().to_bytes();
         let schema = Arc::new(SchemaText::new("its type".into(), SCHEMA_ENCODING.into(), data));
         let (topic, message_encoding) = ("eye.0/sight".into(), MESSAGE_ENCODING.into());
-        drawing.add(0, Definition { topic, message_encoding, texts: BTreeMap::new(), schema });
+        drawing.add(0, Definition { topic, message_encoding, schema, ..Definition::default() });
         for (at_ns, rows, is_whole, is_drawn, why) in [
             (0, 10, false, false, "a short one that contradicts itself"),
             (1, 10, true, true, "and the next one"),

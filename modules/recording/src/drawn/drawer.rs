@@ -151,5 +151,6 @@ fn drawn_channel(topic: &str, kind: Kind, is_reduced: bool, of: &Definition, sch
             schema::SCHEMA_ENCODING.into(),
             schema.to_vec(),
         )),
+        ..Definition::default()
     })
 }

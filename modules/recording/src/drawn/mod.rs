@@ -22,7 +22,7 @@ mod schema;
 mod tests;
 
 use crate::error::{DiskError, ReadError, RewriteError};
-use crate::format::{key, metadata};
+use crate::format::{key, metadata, our_header};
 use crate::read::contents::Found;
 use crate::read::selected::Selected;
 use crate::rewrite::{Progress, Rewriter};
@@ -106,14 +106,14 @@ pub fn draw(
 ) -> Result<Drawn, DrawError> {
     let mut selected = Selected::open(path, selection)?;
     let mut drawing = Drawing::new(&selected, options)?;
-    let mut new = Rewriter::create(to)?;
-    selected.each_metadata(|its| {
+    let mut new = Rewriter::create(to, &our_header())?;
+    selected.each_metadata(false, |its| {
         if options.with_original || its.name != metadata::LOST {
-            new.metadata(&its.name, its.metadata).map_err(RewriteError::from)?;
+            new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?;
         }
         Ok::<_, DrawError>(())
     })?;
-    new.metadata(metadata::DRAWN, selection.about(path)).map_err(RewriteError::from)?;
+    new.metadata(metadata::DRAWN, &selection.about(path)).map_err(RewriteError::from)?;
     while let Some(found) = selected.next()? {
         progress(selected.at(), selected.file_bytes());
         drawing.message(&found, selected.data(&found), options.with_original, &mut new).map_err(RewriteError::from)?;

@@ -17,8 +17,8 @@ fn drawn<T: Data>(value: &T, bytes_max: Option<usize>) -> Vec<DrawnMessage> {
     let channel = Definition {
         topic: "eye.0/sight".into(),
         message_encoding: MESSAGE_ENCODING.into(),
-        texts: BTreeMap::new(),
         schema: Arc::new(schema),
+        ..Definition::default()
     };
     let mut drawer = Drawer::new(BTreeMap::new(), bytes_max);
     drawer.add(0, &channel).unwrap();

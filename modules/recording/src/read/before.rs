@@ -101,7 +101,7 @@ fn messages_at(contents: &mut Contents, places: &[Place]) -> Result<Vec<EarlierM
                 }
             }
             Item::Damaged(at, what) => return Err(contents.damaged(at, what)),
-            Item::Metadata(_) => {}
+            Item::Metadata(_) | Item::Attachment(_) => {}
         }
     }
     Ok(found.into_values().collect())

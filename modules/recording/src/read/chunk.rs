@@ -1,13 +1,13 @@
 //! A chunk: unpacked and checked, or unpacked as far as it goes.
 
-use crate::error::Damage;
+use crate::error::{Damage, FileLimit};
 use crate::format::RECORD_BYTES_MAX;
 use crate::read::frames::HEAD_BYTES;
 use std::io::Read;
 use std::ops::Range;
 
-/// Memory for unpacking is at most 16 MiB; what is compressed here needs less.
-const WINDOW_LOG_MAX: u32 = 24;
+/// Memory for unpacking is at most that of the longest chunk; what is compressed here needs less.
+const WINDOW_LOG_MAX: u32 = RECORD_BYTES_MAX.ilog2();
 
 /// What is before a chunk's records.
 struct Header<'a> {
@@ -47,6 +47,24 @@ fn split(body: &[u8]) -> Option<(Header<'_>, &[u8])> {
     Some((Header { unpacked_bytes, sum, compression, packed_bytes }, fields.0))
 }
 
+/// So many bytes of a chunk's body say how long it is.
+pub(crate) const EXTENT_BYTES: usize = 8 + 8 + 8 + 4 + 4 + 4 + 8;
+
+/// How long the body of a chunk is, by what stands in it; nothing if it is none that is known here.
+pub(crate) fn extent(body: &[u8]) -> Option<u64> {
+    let (header, packed) = split(body)?;
+    let is_known = matches!(header.compression, b"" | b"zstd" | b"lz4");
+    let header_bytes = (body.len() - packed.len()) as u64;
+    header_bytes.checked_add(header.packed_bytes).filter(|_| is_known)
+}
+
+/// Whether this begins the body of an index of messages that is so long: channel, length of a list, its pairs of time and
+/// place.
+pub(crate) fn is_index(body: &[u8], len: u64) -> bool {
+    let list_bytes = body.get(2..).and_then(<[u8]>::first_chunk).map(|bytes| u64::from(u32::from_le_bytes(*bytes)));
+    list_bytes.is_some_and(|bytes| bytes % 16 == 0 && 6 + bytes == len)
+}
+
 /// Unpacks a chunk's records, checked by their sum: all or nothing.
 pub(crate) fn unpack(body: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     records.clear();
@@ -61,7 +79,7 @@ fn unpack_checked(body: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     let (header, packed) = split(body).ok_or(Damage::ChunkSum)?;
     let packed = usize::try_from(header.packed_bytes).ok().and_then(|len| packed.get(..len)).ok_or(Damage::ChunkSum)?;
     if header.unpacked_bytes > RECORD_BYTES_MAX as u64 {
-        return Err(Damage::ChunkSum);
+        return Err(Damage::Limit(FileLimit::Chunk(header.unpacked_bytes)));
     }
     // One more, to see that there are not more.
     decompress(header.compression, packed, header.unpacked_bytes + 1, records)?;

@@ -1,8 +1,11 @@
 //! Messages and metadata of a file, in its order.
 
+mod outside;
+
 use crate::error::{Damage, FileLimit, ReadError, Shown};
 use crate::format::{is_our_word, op};
-use crate::read::ahead::{AheadRecord, ReadAhead};
+use crate::read::ahead::ReadAhead;
+use crate::read::attachment::Attachment;
 use crate::read::chunk;
 use crate::read::definitions::{Definition, Definitions, Untaken};
 use crate::read::frames::{Frames, Step};
@@ -29,6 +32,16 @@ pub(crate) struct Contents {
     chunks: u64,
     /// Where the present record of the file begins.
     begins: u64,
+    /// From here on a record is searched for if none is where the next one should be: behind the present one if it says
+    /// twice how long it is, else behind its head.
+    resume_at: u64,
+    /// Bytes that were read again, since records did not end where they say.
+    reread: u64,
+    has_bare_messages: bool,
+    /// Behind its data a file repeats what it describes.
+    is_behind_data: bool,
+    /// What is wrong with how it begins is told.
+    has_told_magic: bool,
     ending: Option<Ending>,
     /// What reads on, if that is a thread.
     ahead: Option<ReadAhead>,
@@ -52,6 +65,8 @@ pub(crate) enum Item {
     Message(Found),
     /// Of the file, not of a channel.
     Metadata(Metadata),
+    /// A file in it; its bytes are still to be read.
+    Attachment(Attachment),
     /// What is not readable: where its record begins, and why. Reading goes on behind it, if it can.
     Damaged(u64, Damage),
 }
@@ -67,6 +82,24 @@ pub(crate) struct Found {
     is_in_chunk: bool,
 }
 
+impl Found {
+    pub(crate) fn is_in_chunk(&self) -> bool {
+        self.is_in_chunk
+    }
+
+    /// The same with its data in another buffer, to which they are copied.
+    pub(crate) fn copied(&self, bytes: &[u8], to: &mut Vec<u8>) -> Self {
+        let data = to.len()..to.len() + bytes.len();
+        to.extend_from_slice(bytes);
+        Self { header: self.header, channel: self.channel.clone(), data, ..*self }
+    }
+
+    /// Its data in the buffer where they were copied to.
+    pub(crate) fn data_in<'a>(&self, buffer: &'a [u8]) -> &'a [u8] {
+        &buffer[self.data.clone()]
+    }
+}
+
 impl Contents {
     /// From the first record on.
     pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
@@ -75,6 +108,7 @@ impl Contents {
 
     /// With what its index says.
     pub(crate) fn new(frames: Frames, definitions: Definitions) -> Self {
+        let resume_at = frames.at();
         Self {
             frames,
             definitions,
@@ -84,6 +118,11 @@ impl Contents {
             is_cut: false,
             chunks: 0,
             begins: 0,
+            resume_at,
+            reread: 0,
+            has_bare_messages: false,
+            is_behind_data: false,
+            has_told_magic: false,
             ending: None,
             ahead: None,
         }
@@ -123,6 +162,13 @@ impl Contents {
         !(self.definitions.are_others() && is_our_word(&metadata.name))
     }
 
+    /// The same of what the file says in its header; none if it has none that can be read.
+    pub(crate) fn header_of(path: &Path) -> Result<Option<Header>, ReadError> {
+        let mut contents = Self::open(path)?;
+        contents.read_header()?;
+        Ok(contents.header)
+    }
+
     /// Chunks so far.
     pub(crate) fn chunks(&self) -> u64 {
         self.chunks
@@ -131,6 +177,11 @@ impl Contents {
     /// Length of the file.
     pub(crate) fn file_bytes(&self) -> u64 {
         self.frames.len()
+    }
+
+    /// Where the record of the file begins that the last thing was in.
+    pub(crate) fn begins(&self) -> u64 {
+        self.begins
     }
 
     /// Once there is no next thing.
@@ -149,14 +200,25 @@ impl Contents {
         &all[found.data.clone()]
     }
 
-    /// As an error for what reads whole files only.
+    /// As an error for what reads whole files only. What is more than is read here is no damage.
     pub(crate) fn damaged(&self, at: u64, what: Damage) -> ReadError {
-        ReadError::Damaged { path: Shown(self.path().to_owned()), at, what }
+        match what {
+            Damage::Limit(limit) => self.too_much(limit),
+            what => ReadError::Damaged { path: Shown(self.path().to_owned()), at, what },
+        }
     }
 
     /// The next thing; none at the end.
     pub(crate) fn next(&mut self) -> Result<Option<Item>, ReadError> {
-        while self.ending.is_none() {
+        if self.frames.has_bad_magic() && !std::mem::replace(&mut self.has_told_magic, true) {
+            return Ok(Some(Item::Damaged(0, Damage::Magic)));
+        }
+        self.next_before(u64::MAX)
+    }
+
+    /// The next thing that begins before this end of a record; none behind that.
+    pub(crate) fn next_before(&mut self, ends: u64) -> Result<Option<Item>, ReadError> {
+        while self.ending.is_none() && (self.in_chunk.is_some() || self.frames.at() < ends) {
             let found = match self.in_chunk {
                 Some(_) => self.next_in_chunk()?,
                 None => self.next_outside()?,
@@ -196,8 +258,14 @@ impl Contents {
 
     /// Reads on from there, where a record of the file begins.
     pub(crate) fn go_to(&mut self, at: u64) -> Result<(), ReadError> {
-        (self.in_chunk, self.ahead) = (None, None);
+        (self.in_chunk, self.ahead, self.resume_at) = (None, None, at);
         self.frames.seek(at)
+    }
+
+    /// The same, also once its end was reached.
+    pub(crate) fn read_again(&mut self, at: u64) -> Result<(), ReadError> {
+        (self.ending, self.is_cut, self.is_behind_data) = (None, false, false);
+        self.go_to(at)
     }
 
     /// Reads which program wrote it: the first record.
@@ -248,96 +316,6 @@ impl Contents {
                 Err(Untaken::TooMuch(limit)) => return Err(self.too_much(limit)),
             }
         }
-    }
-
-    /// The next record of the file; none if it is nothing of its own.
-    fn next_outside(&mut self) -> Result<Option<Item>, ReadError> {
-        let (step, unpacked) = self.step()?;
-        let begins = self.begins;
-        let damaged = |damage| Some(Item::Damaged(begins, damage));
-        if let Some(unpacked) = unpacked {
-            return Ok(self.enter_chunk(unpacked).err().and_then(damaged));
-        }
-        Ok(match step {
-            Step::Record(op) => self.record(op)?,
-            Step::Cut(Some(op::CHUNK)) => {
-                chunk::unpack_cut(self.frames.body(), &mut self.records);
-                self.in_chunk = Some(0);
-                self.is_cut = true;
-                damaged(Damage::Cut)
-            }
-            Step::Cut(_) => {
-                self.ending = Some(Ending::Open);
-                damaged(Damage::Cut)
-            }
-            Step::Damaged(damage) => {
-                self.ending = Some(Ending::Damaged);
-                damaged(damage)
-            }
-            Step::End => {
-                self.ending = Some(Ending::Open);
-                None
-            }
-        })
-    }
-
-    /// What is next in the file, and whether it is a chunk that was unpacked or could not be.
-    fn step(&mut self) -> Result<(Step, Option<Result<(), Damage>>), ReadError> {
-        let Some(ahead) = &mut self.ahead else {
-            self.begins = self.frames.at();
-            return Ok((self.frames.step()?, None));
-        };
-        let Some(AheadRecord { begins, ends, step, mut body, unpacked }) = ahead.next() else {
-            self.ahead = None;
-            self.frames.seek(self.frames.at())?;
-            return self.step();
-        };
-        self.begins = begins;
-        self.frames.pass_to(ends);
-        match unpacked {
-            Some(_) => std::mem::swap(&mut self.records, &mut body),
-            None => self.frames.swap_body(&mut body),
-        }
-        ahead.give_back(body);
-        Ok((step?, unpacked))
-    }
-
-    fn record(&mut self, op: u8) -> Result<Option<Item>, ReadError> {
-        let told = match op {
-            op::CHUNK => {
-                let unpacked = chunk::unpack(self.frames.body(), &mut self.records);
-                self.enter_chunk(unpacked).map(|()| None)
-            }
-            op::MESSAGE => self.found(0..self.frames.body().len(), false).map(|found| Some(Item::Message(found))),
-            op::SCHEMA | op::CHANNEL => match self.definitions.add(op, self.frames.body()) {
-                Ok(()) => Ok(None),
-                Err(Untaken::Damaged(damage)) => Err(damage),
-                Err(Untaken::TooMuch(limit)) => return Err(self.too_much(limit)),
-            },
-            op::HEADER | op::METADATA => match mcap::parse_record(op, self.frames.body()) {
-                Ok(Record::Metadata(metadata)) => Ok(Some(Item::Metadata(metadata))),
-                Ok(Record::Header(header)) => {
-                    self.definitions.know(&header);
-                    self.header = Some(header);
-                    Ok(None)
-                }
-                _ => Err(Damage::Record { op }),
-            },
-            op::FOOTER => {
-                let is_whole = self.frames.is_at_end_magic()?;
-                self.ending = Some(if is_whole { Ending::Closed } else { Ending::Open });
-                Ok(None)
-            }
-            _ => Ok(None),
-        };
-        Ok(told.unwrap_or_else(|damage| Some(Item::Damaged(self.begins, damage))))
-    }
-
-    fn enter_chunk(&mut self, unpacked: Result<(), Damage>) -> Result<(), Damage> {
-        unpacked?;
-        self.in_chunk = Some(0);
-        self.chunks += 1;
-        Ok(())
     }
 
     fn found(&self, body: Range<usize>, is_in_chunk: bool) -> Result<Found, Damage> {

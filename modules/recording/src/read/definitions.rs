@@ -13,13 +13,19 @@ const CHANNEL_BYTES: usize = 512;
 const TEXTS_FACTOR: usize = 8;
 
 /// A channel and its type.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Definition {
     pub(crate) topic: String,
     pub(crate) message_encoding: String,
     pub(crate) texts: BTreeMap<String, String>,
+    /// Texts of another program under keys of ours, where they mean something else.
+    pub(crate) unheeded: BTreeMap<String, String>,
     pub(crate) schema: Arc<SchemaText>,
 }
+
+/// Topic, encoding, type, texts: see [`Definition::identity`].
+pub(crate) type ChannelIdentity<'a> =
+    (&'a str, &'a str, Option<*const SchemaText>, Option<Vec<(&'a String, &'a String)>>);
 
 /// A type, as it is described: once for all of its channels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -57,6 +63,15 @@ impl SchemaText {
 }
 
 impl Definition {
+    /// What channels have in common that are told as one: a topic of ours has a channel for each epoch. Channels of
+    /// others with different texts are different ones.
+    pub(crate) fn identity(&self) -> ChannelIdentity<'_> {
+        let schema = (*self.schema != SchemaText::default()).then(|| Arc::as_ptr(&self.schema));
+        let texts = || self.texts.iter().filter(|(key, _)| *key != key::REPEATED).chain(&self.unheeded);
+        let texts = self.schema.ty().is_none().then(|| texts().collect());
+        (&self.topic, &self.message_encoding, schema, texts)
+    }
+
     /// Whether its messages are from an earlier file, as the beginning of this one.
     pub(crate) fn is_repeated(&self) -> bool {
         self.texts.contains_key(key::REPEATED)
@@ -73,7 +88,7 @@ impl Definition {
 pub(crate) struct Definitions {
     schemas: BTreeMap<u16, Arc<SchemaText>>,
     channels: BTreeMap<u16, Arc<Definition>>,
-    /// Of another program: texts under our keys mean nothing, and are left out.
+    /// Of another program: texts under our keys mean nothing.
     are_others: bool,
     memory: DescribedBytes,
 }
@@ -140,10 +155,14 @@ impl Definitions {
                     id => self.schemas.get(&id).cloned().ok_or(Damage::UnknownSchema(id))?,
                 };
                 let mcap::records::Channel { id, topic, message_encoding, metadata: mut texts, .. } = channel;
+                let mut unheeded = BTreeMap::new();
                 if self.are_others {
-                    texts.retain(|key, _| !key::ALL.contains(&key.as_str()));
+                    unheeded.extend(texts.extract_if(.., |key, _| key::ALL.contains(&key.as_str())));
+                    if let Some(text) = texts.remove(key::REPEATED_OF_OTHERS) {
+                        texts.insert(key::REPEATED.into(), text);
+                    }
                 }
-                let channel = Arc::new(Definition { topic, message_encoding, texts, schema });
+                let channel = Arc::new(Definition { topic, message_encoding, texts, unheeded, schema });
                 if let Some(known) = self.channels.get(&id) {
                     return if *known == channel { Ok(()) } else { Err(Damage::Redefined(id).into()) };
                 }

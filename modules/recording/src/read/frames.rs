@@ -1,7 +1,7 @@
 //! A file record by record, as far as it goes.
 
 use crate::disk::open_to_read;
-use crate::error::{Damage, ReadError, Shown};
+use crate::error::{Damage, FileLimit, ReadError, Shown};
 use crate::format::{RECORD_BYTES_MAX, op};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -17,6 +17,7 @@ pub(crate) struct Frames {
     len: u64,
     at: u64,
     body: Vec<u8>,
+    has_bad_magic: bool,
 }
 
 /// What is at a place.
@@ -44,12 +45,20 @@ impl Frames {
             len,
             at: 0,
             body: Vec::new(),
+            has_bad_magic: false,
         };
-        frames.fill(mcap::MAGIC.len() as u64)?;
-        if !mcap::MAGIC.starts_with(&frames.body) {
+        let got = frames.fill(mcap::MAGIC.len() as u64)?;
+        let wrong = frames.body.iter().zip(mcap::MAGIC).filter(|(one, other)| one != other).count();
+        frames.has_bad_magic = wrong == 1 && got == mcap::MAGIC.len() as u64;
+        if wrong > 0 && !frames.has_bad_magic {
             return Err(ReadError::NotMcap { path: Shown(path.to_owned()) });
         }
         Ok(frames)
+    }
+
+    /// One byte of what it begins with is wrong: damage, rather than another kind of file.
+    pub(crate) fn has_bad_magic(&self) -> bool {
+        self.has_bad_magic
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -124,22 +133,35 @@ impl Frames {
         Ok(if op == 0 { Err(Step::Damaged(Damage::NoRecord { op, len })) } else { Ok((op, len)) })
     }
 
-    /// The record behind its head.
+    /// The record behind its head. Attachments are passed over, and have no bytes then: they may be of any length.
     fn record(&mut self, op: u8, len: u64) -> Result<Step, ReadError> {
-        if len > RECORD_BYTES_MAX as u64 {
-            return self.skip(op, len);
+        let end = self.at.checked_add(len).filter(|end| *end <= self.len);
+        match end {
+            Some(end) if op == op::ATTACHMENT => {
+                self.body.clear();
+                self.seek(end)?;
+                Ok(Step::Record(op))
+            }
+            Some(end) if len > RECORD_BYTES_MAX as u64 => {
+                self.body.clear();
+                self.seek(end)?;
+                Ok(Step::Damaged(Damage::Limit(FileLimit::Record(len))))
+            }
+            None if len > RECORD_BYTES_MAX as u64 => Ok(Step::Damaged(Damage::NoRecord { op, len })),
+            _ => {
+                let got = self.fill(len)?;
+                Ok(if got == len { Step::Record(op) } else { Step::Cut(Some(op)) })
+            }
         }
-        let got = self.fill(len)?;
-        Ok(if got == len { Step::Record(op) } else { Step::Cut(Some(op)) })
     }
 
-    /// Attachments of other programs may be long. All else is damage.
-    fn skip(&mut self, op: u8, len: u64) -> Result<Step, ReadError> {
-        let end = self.at.checked_add(len).filter(|end| op == op::ATTACHMENT && *end <= self.len);
-        let Some(end) = end else { return Ok(Step::Damaged(Damage::NoRecord { op, len })) };
-        self.body.clear();
-        self.seek(end)?;
-        Ok(Step::Record(op))
+    /// Fills a buffer with the bytes there, as many as there are. The next step is behind them.
+    pub(crate) fn bytes_at(&mut self, at: u64, buffer: &mut Vec<u8>, wanted: usize) -> Result<(), ReadError> {
+        self.seek(at)?;
+        self.swap_body(buffer);
+        let told = self.fill(wanted as u64);
+        self.swap_body(buffer);
+        told.map(drop)
     }
 
     /// Reads so many bytes into the body, or as many as there are.

@@ -4,7 +4,7 @@ use crate::error::{Damage, ReadError, Shown};
 use crate::format::op;
 use crate::read::definitions::{Definitions, Untaken};
 use crate::read::frames::{Frames, HEAD_BYTES, Step};
-use mcap::records::{ChunkIndex, MessageIndex, MetadataIndex, Record, Statistics};
+use mcap::records::{AttachmentIndex, ChunkIndex, MessageIndex, MetadataIndex, Record, Statistics};
 
 /// Footer: where the summary begins, where its offsets do, its sum.
 const FOOTER_BYTES: usize = 8 + 8 + 4;
@@ -15,39 +15,54 @@ pub(crate) struct Index {
     /// In the order of the file.
     pub(crate) chunks: Vec<ChunkIndex>,
     pub(crate) metadata: Vec<MetadataIndex>,
-    pub(crate) statistics: Statistics,
+    pub(crate) attachments: Vec<AttachmentIndex>,
+    /// Others may count nothing.
+    pub(crate) statistics: Option<Statistics>,
+    /// Its sum says that it is right. Others may write none.
+    pub(crate) is_checked: bool,
 }
 
 impl Index {
     /// Whether each message is in a chunk that is listed here. Others may write no chunks, or list none.
     pub(crate) fn knows_all_chunks(&self) -> bool {
         let listed = self.chunks.len() as u64;
-        listed == u64::from(self.statistics.chunk_count) && (listed > 0 || self.statistics.message_count == 0)
+        self.statistics
+            .as_ref()
+            .is_some_and(|its| listed == u64::from(its.chunk_count) && (listed > 0 || its.message_count == 0))
     }
 
     /// Whether each channel with messages is described here. Others may not describe them again.
     pub(crate) fn describes_all_channels(&self) -> bool {
-        let counts = &self.statistics.channel_message_counts;
-        let counted = counts.values().try_fold(0_u64, |sum, count| sum.checked_add(*count));
-        counted == Some(self.statistics.message_count)
-            && counts.keys().all(|id| self.definitions.channel(*id).is_some())
+        self.statistics.as_ref().is_some_and(|its| {
+            let counts = &its.channel_message_counts;
+            let counted = counts.values().try_fold(0_u64, |sum, count| sum.checked_add(*count));
+            counted == Some(its.message_count) && counts.keys().all(|id| self.definitions.channel(*id).is_some())
+        })
+    }
+
+    /// Whether metadata and attachments are all listed here.
+    pub(crate) fn lists_what_is_no_message(&self) -> bool {
+        self.statistics.as_ref().is_some_and(|its| {
+            let listed = (self.metadata.len() as u64, self.attachments.len() as u64);
+            listed == (its.metadata_count.into(), its.attachment_count.into())
+        })
     }
 
     /// Whether it says of each channel with messages in which chunks they are.
     pub(crate) fn knows_all_channels(&self) -> bool {
         let has_offset = |id: &u16| self.chunks.iter().any(|chunk| chunk.message_index_offsets.contains_key(id));
-        let mut counts = self.statistics.channel_message_counts.iter();
+        let counts = self.statistics.iter().flat_map(|its| &its.channel_message_counts);
         self.knows_all_chunks()
             && self.describes_all_channels()
-            && counts.all(|(id, messages)| *messages == 0 || has_offset(id))
+            && counts.into_iter().all(|(id, messages)| *messages == 0 || has_offset(id))
     }
 
     /// Whether its times can be those of messages: the first is not behind the last.
     pub(crate) fn knows_times(&self) -> bool {
-        self.statistics.message_start_time <= self.statistics.message_end_time
+        self.statistics.as_ref().is_some_and(|its| its.message_start_time <= its.message_end_time)
     }
 
-    /// Reads it, checked by its sum.
+    /// Reads it, checked by its sum. A file that was closed need not have one; then nothing is in it.
     pub(crate) fn read(frames: &mut Frames) -> Result<Self, ReadError> {
         let not_closed = ReadError::NotClosed { path: Shown(frames.path().to_owned()) };
         let footer_at = frames.len().saturating_sub((HEAD_BYTES + FOOTER_BYTES + mcap::MAGIC.len()) as u64);
@@ -60,7 +75,7 @@ impl Index {
         }
         let (head, body) = footer.split_at(HEAD_BYTES);
         let Ok(Record::Footer(footer)) = mcap::parse_record(op::FOOTER, body) else { return Err(not_closed) };
-        if footer.summary_start == 0 || footer.summary_start > footer_at {
+        if footer.summary_start > footer_at {
             return Err(not_closed);
         }
         let mut sum_end = head.to_vec();
@@ -72,17 +87,18 @@ impl Index {
         {
             read.definitions.know(&header);
         }
-        let told = read.summary(frames, footer.summary_start, footer_at)?;
+        let from = if footer.summary_start == 0 { footer_at } else { footer.summary_start };
+        let told = read.summary(frames, from, footer_at)?;
         read.sum.update(&sum_end);
         let is_right = footer.summary_crc == 0 || footer.summary_crc == read.sum.clone().finalize();
-        match (told, is_right, read.statistics) {
-            (Some(damage), ..) => Err(damaged(frames, damage)),
-            (None, false, _) => Err(damaged(frames, Damage::SummarySum)),
-            (None, true, None) => Err(not_closed),
-            (None, true, Some(statistics)) => {
+        match (told, is_right) {
+            (Some(damage), _) => Err(damaged(frames, damage)),
+            (None, false) => Err(damaged(frames, Damage::SummarySum)),
+            (None, true) => {
                 read.chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
-                let Reading { definitions, chunks, metadata, .. } = read;
-                Ok(Self { definitions, chunks, metadata, statistics })
+                let Reading { definitions, chunks, metadata, attachments, statistics, .. } = read;
+                let is_checked = footer.summary_crc != 0;
+                Ok(Self { definitions, chunks, metadata, attachments, statistics, is_checked })
             }
         }
     }
@@ -94,6 +110,7 @@ struct Reading {
     definitions: Definitions,
     chunks: Vec<ChunkIndex>,
     metadata: Vec<MetadataIndex>,
+    attachments: Vec<AttachmentIndex>,
     statistics: Option<Statistics>,
     sum: crc32fast::Hasher,
 }
@@ -126,12 +143,13 @@ impl Reading {
                 Err(Untaken::Damaged(Damage::UnknownSchema(_))) => return Ok(()),
                 told => return told,
             },
-            op::CHUNK_INDEX | op::METADATA_INDEX | op::STATISTICS => {}
+            op::CHUNK_INDEX | op::METADATA_INDEX | op::ATTACHMENT_INDEX | op::STATISTICS => {}
             _ => return Ok(()),
         }
         match mcap::parse_record(op, body).map_err(|_| Damage::Record { op })? {
             Record::ChunkIndex(index) => self.chunks.push(index),
             Record::MetadataIndex(index) => self.metadata.push(index),
+            Record::AttachmentIndex(index) => self.attachments.push(index),
             Record::Statistics(statistics) => self.statistics = Some(statistics),
             _ => {}
         }

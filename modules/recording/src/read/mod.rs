@@ -11,6 +11,7 @@
 //! kept of a file is counted (`cost`).
 
 pub(crate) mod ahead;
+pub(crate) mod attachment;
 pub(crate) mod before;
 pub(crate) mod chunk;
 pub(crate) mod contents;
@@ -19,4 +20,7 @@ pub(crate) mod definitions;
 pub(crate) mod frames;
 pub(crate) mod index;
 pub(crate) mod last;
+pub(crate) mod ordered;
+pub(crate) mod outline;
+pub(crate) mod resync;
 pub(crate) mod selected;

@@ -1,12 +1,13 @@
 //! The messages of a file that a selection takes, in the file's order.
 
-use crate::error::{ReadError, Shown};
+use crate::error::{Damage, ReadError, Shown};
 use crate::format::metadata;
 use crate::order::Mark;
+use crate::read::attachment::Attachment;
 use crate::read::contents::{Contents, Ending, Found, Item};
-use crate::read::definitions::{Definition, Definitions};
+use crate::read::definitions::Definition;
 use crate::read::frames::Frames;
-use crate::read::index::Index;
+use crate::read::outline::Outline;
 use crate::selection::{SelectError, Selection};
 use crate::shape::Shape;
 use mcap::records::{ChunkIndex, Metadata};
@@ -23,6 +24,7 @@ pub(crate) struct Selected {
     channels: BTreeMap<u16, WantedChannel>,
     /// Where metadata is.
     metadata: Vec<u64>,
+    attachments: Vec<Attachment>,
     way: Way,
 }
 
@@ -48,31 +50,27 @@ impl Selected {
     pub(crate) fn open(path: &Path, selection: &Selection) -> Result<Self, SelectError> {
         selection.check_time()?;
         let mut frames = Frames::open(path)?;
-        let mut index = Index::read(&mut frames)?;
-        if !index.describes_all_channels() {
-            index.definitions = described(path)?;
-        }
-        let all = || index.definitions.channels();
+        let Outline { definitions, metadata, attachments, chunks } = Outline::read(&mut frames)?;
+        let all = || definitions.channels();
         selection.check_names(all().map(|(_, channel)| &**channel))?;
         let wanted = all().filter(|(_, channel)| selection.has_channel(channel));
         let channels: BTreeMap<u16, WantedChannel> =
             wanted.map(|(id, channel)| (id, WantedChannel::new(channel))).collect();
-        let way = if index.knows_all_chunks() {
+        let way = if let Some(chunks) = chunks {
             // Without an index of its messages, a chunk may have any.
             let has_some = |chunk: &&ChunkIndex| {
                 let offsets = &chunk.message_index_offsets;
                 selection.has_time(chunk.message_start_time, chunk.message_end_time)
                     && (offsets.is_empty() || offsets.keys().any(|id| channels.contains_key(id)))
             };
-            let chunks: Vec<u64> = index.chunks.iter().filter(has_some).map(|its| its.chunk_start_offset).collect();
+            let chunks: Vec<u64> = chunks.iter().filter(has_some).map(|its| its.chunk_start_offset).collect();
             Way::Chunks(chunks.into_iter())
         } else {
             frames.seek(mcap::MAGIC.len() as u64)?;
             Way::Through
         };
-        let metadata = index.metadata.iter().map(|at| at.offset).collect();
-        let contents = Contents::new(frames, index.definitions);
-        Ok(Self { contents, selection: selection.clone(), channels, metadata, way })
+        let contents = Contents::new(frames, definitions);
+        Ok(Self { contents, selection: selection.clone(), channels, metadata, attachments, way })
     }
 
     /// Channels that are wanted.
@@ -80,17 +78,28 @@ impl Selected {
         self.channels.iter().map(|(id, wanted)| (*id, &wanted.channel))
     }
 
+    /// Its attachments, once: for a new file that is made of it.
+    pub(crate) fn take_attachments(&mut self) -> Vec<Attachment> {
+        std::mem::take(&mut self.attachments)
+    }
+
+    /// As an error.
+    pub(crate) fn damaged(&self, at: u64, what: Damage) -> ReadError {
+        self.contents.damaged(at, what)
+    }
+
     /// What the file says of itself, but for how it was closed, and for marks out of the time range: for a new file
-    /// that is made of it.
+    /// that is made of it. `keeps_theirs`: also what is not to be heeded, as another program wrote it.
     pub(crate) fn each_metadata<E: From<ReadError>>(
         &mut self,
+        keeps_theirs: bool,
         mut take: impl FnMut(Metadata) -> Result<(), E>,
     ) -> Result<(), E> {
         let begin = self.contents.at();
         for at in std::mem::take(&mut self.metadata) {
             let its = self.contents.metadata_at(at)?;
             let is_taken = match its.name.as_str() {
-                _ if !self.contents.heeds(&its) => false,
+                _ if !self.contents.heeds(&its) => keeps_theirs,
                 metadata::CLOSED => false,
                 metadata::MARK => {
                     Mark::of_texts(&its.metadata).is_none_or(|mark| self.selection.has_time(mark.time_ns, mark.time_ns))
@@ -110,7 +119,7 @@ impl Selected {
             match item {
                 Item::Message(found) if self.takes(&found) => return Ok(Some(found)),
                 Item::Damaged(at, what) => return Err(self.contents.damaged(at, what)),
-                Item::Message(_) | Item::Metadata(_) => {}
+                Item::Message(_) | Item::Metadata(_) | Item::Attachment(_) => {}
             }
         }
         Ok(None)
@@ -160,17 +169,6 @@ impl Selected {
         let period = Some(header.publish_time / period_ns.max(1));
         std::mem::replace(&mut wanted.period, period) != period
     }
-}
-
-/// All that is described anywhere in a file.
-fn described(path: &Path) -> Result<Definitions, ReadError> {
-    let mut contents = Contents::open(path)?;
-    while let Some(item) = contents.next()? {
-        if let Item::Damaged(at, what) = item {
-            return Err(contents.damaged(at, what));
-        }
-    }
-    Ok(contents.definitions().clone())
 }
 
 impl WantedChannel {

@@ -3,10 +3,11 @@
 use super::support::memory_folder;
 use crate::format::{key, metadata, op};
 use crate::read::chunk;
+use crate::read::contents::Contents;
 use crate::{Damage, Info, Reader, Selection, cut, info, merge, recover};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
 
@@ -124,9 +125,9 @@ fn our_words_in_files_of_others_mean_nothing() {
     }
 }
 
-/// Else they would mean something in the new file, which is one of ours.
+/// They are there, and mean in the new file what they mean in the old one.
 #[test]
-fn our_words_in_files_of_others_are_left_out_of_files_that_are_made_of_these() {
+fn our_words_in_files_of_others_stay_theirs_in_files_that_are_made_of_these() {
     let folder = memory_folder();
     let [theirs, cut_out, before, merged, whole] =
         ["theirs", "cut", "before", "merged", "whole"].map(|name| folder.path().join(name));
@@ -140,7 +141,20 @@ fn our_words_in_files_of_others_are_left_out_of_files_that_are_made_of_these() {
     for (made, messages, repeated) in [(cut_out, 3, 0), (before, 0, 3), (merged, 6, 0), (whole, 3, 0)] {
         let told = info(&made).unwrap();
         assert_eq!((told.messages, told.repeated, told.lost), (messages, repeated, 0), "{}", made.display());
-        assert!(told.session.is_empty() && told.others.iter().any(|(name, _)| name == "theirs"), "{told:?}");
+        assert_eq!((told.profile.as_str(), told.session.len()), ("ros2", 0));
+        for name in [metadata::LOST, metadata::SESSION, "theirs"] {
+            assert!(told.others.iter().any(|(other, texts)| other == name && texts["/0"] == "9"), "{name}: {told:?}");
+        }
+        assert_eq!(told.channels.len(), 3, "{told:?}");
+        let mut contents = Contents::open(&made).unwrap();
+        while contents.next().unwrap().is_some() {}
+        let words: BTreeSet<_> = contents.definitions().channels().flat_map(|(_, its)| its.unheeded.keys()).collect();
+        assert_eq!(
+            words.into_iter().collect::<Vec<_>>(),
+            [key::DRAWN, key::EPOCH, key::REPEATED],
+            "{}",
+            made.display()
+        );
         assert!(told.channels.iter().all(|channel| channel.drawn_of.is_none()) && told.epochs.is_empty(), "{told:?}");
         let mut reader = Reader::open(&made).unwrap();
         while let Some((channel, _)) = reader.next().unwrap() {

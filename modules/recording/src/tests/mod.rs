@@ -1,12 +1,15 @@
 //! What is written is read again; of what is cut or damaged, what is there; and a failing disk loses nothing uncounted.
 
 mod beginning;
+mod conformance;
 mod costly;
 mod cutting;
 mod damaged;
 mod disks;
 mod dying;
 mod failing;
+mod features;
+mod flipped;
 mod foreign;
 mod merging;
 mod moved;

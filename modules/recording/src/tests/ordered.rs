@@ -48,7 +48,7 @@ fn content(path: &Path) -> Vec<String> {
         match item {
             Item::Message(found) => all.push(found.header.sequence.to_string()),
             Item::Metadata(its) if its.name == crate::format::metadata::MARK => all.push(its.metadata["text"].clone()),
-            Item::Metadata(_) => {}
+            Item::Metadata(_) | Item::Attachment(_) => {}
             Item::Damaged(at, damage) => panic!("{}: {at}: {damage}", path.display()),
         }
     }

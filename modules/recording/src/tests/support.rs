@@ -102,7 +102,7 @@ pub(super) fn read(path: &Path) -> (Vec<Said>, usize) {
                 data: contents.data(&found).to_vec(),
             }),
             Item::Damaged(..) => damages += 1,
-            Item::Metadata(_) => {}
+            Item::Metadata(_) | Item::Attachment(_) => {}
         }
     }
     (all, damages)

@@ -1,0 +1,254 @@
+//! Messages of a file in the order of time, wherever they are in it: programs of others need not write them so.
+//!
+//! ```text
+//! stretches of the file, by their first message ──▶ held, sorted ──the earliest of all──▶ batches ──▶ Reader
+//!                                                         (a thread, some megabytes ahead)
+//! ```
+//!
+//! A stretch is a chunk, or messages outside of chunks. It is held from its first message on until its last one was
+//! taken: as many are in memory as overlap in time. Among messages of one time the file's order stays.
+
+use crate::error::{Damage, FileLimit, ReadError};
+use crate::read::contents::{Contents, Ending, Found, Item};
+use crate::read::definitions::Definitions;
+use crate::read::frames::Frames;
+use crate::read::index::Index;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap, VecDeque};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::vec;
+
+/// Messages that wait for their turn take no more memory than this.
+pub(crate) const HELD_BYTES_MAX: usize = 256 << 20;
+/// Messages outside of chunks make stretches of this length.
+const STRETCH_BYTES: u64 = 1 << 20;
+/// So much is handed over at once, unless one message is longer, and so often ahead.
+const BATCH_BYTES: usize = 1 << 20;
+const BATCHES_AHEAD: usize = 2;
+
+/// A part of the file, and the times of its messages.
+#[derive(Clone, Copy)]
+struct Stretch {
+    begins: u64,
+    ends: u64,
+    first_ns: u64,
+    last_ns: u64,
+}
+
+/// Where in a file which times are.
+#[derive(Clone)]
+pub(crate) struct TimePlan {
+    definitions: Definitions,
+    /// By their first message.
+    stretches: Arc<Vec<Stretch>>,
+    is_closed: bool,
+    /// What is wrong with the file first.
+    damage: Option<(u64, Damage)>,
+}
+
+/// Messages that follow each other in time.
+#[derive(Default)]
+pub(crate) struct OrderedBatch {
+    pub(crate) data: Vec<u8>,
+    pub(crate) found: VecDeque<Found>,
+    /// So many bytes of the file are read.
+    pub(crate) read_bytes: u64,
+}
+
+impl TimePlan {
+    /// By the index, if that lists all chunks; else by reading the file.
+    pub(crate) fn of(path: &Path) -> Result<Self, ReadError> {
+        let index = match Index::read(&mut Frames::open(path)?) {
+            Ok(index) if index.knows_all_chunks() && index.describes_all_channels() => index,
+            Ok(_) | Err(ReadError::NotClosed { .. } | ReadError::Damaged { .. }) => return Self::by_reading(path),
+            Err(error) => return Err(error),
+        };
+        let chunks = index.chunks.iter().filter(|chunk| chunk.message_index_length > 0 || chunk.message_end_time > 0);
+        let stretches = chunks.map(|chunk| Stretch {
+            begins: chunk.chunk_start_offset,
+            ends: chunk.chunk_start_offset.saturating_add(chunk.chunk_length),
+            first_ns: chunk.message_start_time,
+            last_ns: chunk.message_end_time,
+        });
+        Ok(Self::new(index.definitions.clone(), stretches.collect(), true, None))
+    }
+
+    fn new(
+        definitions: Definitions,
+        mut stretches: Vec<Stretch>,
+        is_closed: bool,
+        damage: Option<(u64, Damage)>,
+    ) -> Self {
+        stretches.sort_by_key(|its| (its.first_ns, its.begins));
+        Self { definitions, stretches: Arc::new(stretches), is_closed, damage }
+    }
+
+    fn by_reading(path: &Path) -> Result<Self, ReadError> {
+        let mut contents = Contents::open(path)?;
+        let (mut stretches, mut damage): (Vec<Stretch>, _) = (Vec::new(), None);
+        while let Some(item) = contents.next()? {
+            let found = match item {
+                Item::Message(found) => found,
+                Item::Damaged(at, what) => {
+                    damage.get_or_insert((at, what));
+                    continue;
+                }
+                Item::Metadata(_) | Item::Attachment(_) => continue,
+            };
+            let (begins, ends, log_ns) = (contents.begins(), contents.at(), found.header.log_time);
+            match stretches.last_mut() {
+                Some(last) if last.takes(begins, ends, found.is_in_chunk()) => {
+                    (last.first_ns, last.last_ns) = (last.first_ns.min(log_ns), last.last_ns.max(log_ns));
+                    last.ends = ends;
+                }
+                _ => stretches.push(Stretch { begins, ends, first_ns: log_ns, last_ns: log_ns }),
+            }
+        }
+        let is_closed = contents.ending() == Some(Ending::Closed);
+        Ok(Self::new(contents.definitions().clone(), stretches, is_closed, damage))
+    }
+
+    pub(crate) fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// Messages from a time on, read by a thread that ends with its receiver.
+    pub(crate) fn read(
+        &self,
+        path: &Path,
+        from_ns: u64,
+    ) -> Result<Receiver<Result<OrderedBatch, ReadError>>, ReadError> {
+        let mut ordered = Ordered::new(self.clone(), Frames::open(path)?, from_ns);
+        let (batches, receiver) = sync_channel(BATCHES_AHEAD);
+        let read = move || {
+            loop {
+                let told = ordered.batch();
+                let is_last = told.as_ref().map_or(true, |batch| batch.found.is_empty());
+                if batches.send(told).is_err() || is_last {
+                    return;
+                }
+            }
+        };
+        let thread = std::thread::Builder::new().name("reading in order".into()).spawn(read);
+        thread.map_err(|error| ReadError::Io { path: crate::Shown(path.to_owned()), error })?;
+        Ok(receiver)
+    }
+}
+
+impl Stretch {
+    /// Whether a message of the file's next record, or of the same chunk, is of it.
+    fn takes(&self, begins: u64, ends: u64, is_in_chunk: bool) -> bool {
+        if is_in_chunk { self.begins == begins } else { ends - self.begins <= STRETCH_BYTES && self.ends == begins }
+    }
+}
+
+/// A file that is read in the order of time.
+struct Ordered {
+    contents: Contents,
+    /// Not held yet.
+    stretches: vec::IntoIter<Stretch>,
+    next: Option<Stretch>,
+    /// Held ones, by where they begin.
+    held: BTreeMap<u64, HeldStretch>,
+    /// The next message of each.
+    earliest: BinaryHeap<Reverse<(u64, u64)>>,
+    held_bytes: usize,
+    read_bytes: u64,
+    from_ns: u64,
+    damage: Option<(u64, Damage)>,
+}
+
+/// Messages of a stretch, sorted.
+struct HeldStretch {
+    data: Vec<u8>,
+    found: VecDeque<Found>,
+}
+
+impl HeldStretch {
+    fn memory(&self) -> usize {
+        self.data.capacity() + self.found.capacity() * size_of::<Found>()
+    }
+}
+
+impl Ordered {
+    fn new(plan: TimePlan, frames: Frames, from_ns: u64) -> Self {
+        let stretches = plan.stretches.iter().filter(|its| its.last_ns >= from_ns).copied().collect::<Vec<_>>();
+        let mut stretches = stretches.into_iter();
+        Self {
+            contents: Contents::new(frames, plan.definitions),
+            next: stretches.next(),
+            stretches,
+            held: BTreeMap::new(),
+            earliest: BinaryHeap::new(),
+            held_bytes: 0,
+            read_bytes: 0,
+            from_ns,
+            damage: plan.damage,
+        }
+    }
+
+    /// The next messages; none at the end. What is wrong with the file is told behind its last message.
+    fn batch(&mut self) -> Result<OrderedBatch, ReadError> {
+        let mut batch = OrderedBatch::default();
+        while batch.data.len() < BATCH_BYTES {
+            if let Some(next) = self.next.filter(|its| self.earliest_ns().is_none_or(|ns| its.first_ns <= ns)) {
+                self.hold(next)?;
+                self.next = self.stretches.next();
+                continue;
+            }
+            let Some(Reverse((_, begins))) = self.earliest.pop() else { break };
+            let Some(held) = self.held.get_mut(&begins) else { continue };
+            if let Some(found) = held.found.pop_front() {
+                batch.found.push_back({
+                    let bytes = found.data_in(&held.data);
+                    found.copied(bytes, &mut batch.data)
+                });
+            }
+            match held.found.front() {
+                Some(next) => self.earliest.push(Reverse((next.header.log_time, begins))),
+                None => self.held_bytes -= self.held.remove(&begins).map_or(0, |its| its.memory()),
+            }
+        }
+        batch.read_bytes = self.read_bytes;
+        match self.damage.take_if(|_| batch.found.is_empty()) {
+            Some((at, what)) => Err(self.contents.damaged(at, what)),
+            None => Ok(batch),
+        }
+    }
+
+    fn earliest_ns(&self) -> Option<u64> {
+        self.earliest.peek().map(|Reverse((ns, _))| *ns)
+    }
+
+    /// Reads a stretch.
+    fn hold(&mut self, stretch: Stretch) -> Result<(), ReadError> {
+        let Stretch { begins, ends, .. } = stretch;
+        let (mut data, mut found) = (Vec::new(), Vec::new());
+        self.contents.read_again(begins)?;
+        while let Some(item) = self.contents.next_before(ends)? {
+            match item {
+                Item::Message(its) if its.header.log_time >= self.from_ns => {
+                    let bytes = self.contents.data(&its);
+                    if self.held_bytes + data.len() + bytes.len() > HELD_BYTES_MAX {
+                        return Err(self.contents.too_much(FileLimit::Disorder));
+                    }
+                    found.push(its.copied(bytes, &mut data));
+                }
+                Item::Damaged(at, what) => drop(self.damage.get_or_insert((at, what))),
+                Item::Message(_) | Item::Metadata(_) | Item::Attachment(_) => {}
+            }
+        }
+        // Stable.
+        found.sort_by_key(|its: &Found| its.header.log_time);
+        let held = HeldStretch { data, found: found.into() };
+        self.read_bytes += ends - begins;
+        if let Some(first) = held.found.front() {
+            self.held_bytes += held.memory();
+            self.earliest.push(Reverse((first.header.log_time, begins)));
+            self.held.insert(begins, held);
+        }
+        Ok(())
+    }
+}
