@@ -156,10 +156,8 @@ fn as_json(info: &Info) -> Value {
     );
     let damages = info.damages.iter().map(|(at, what)| json!({"at": at, "what": what.to_string()}));
     let marks = info.marks.iter().map(|its| json!({"time_ns": its.time_ns, "epoch": its.epoch, "text": its.text}));
-    let attachments = info
-        .attachments
-        .iter()
-        .map(|its| json!({"name": its.name, "media_type": its.media_type, "bytes": its.bytes}));
+    let attachments =
+        info.attachments.iter().map(|its| json!({"name": its.name, "media_type": its.media_type, "bytes": its.bytes}));
     let described = info.described.iter().map(|module| {
         let description = &module.description;
         json!({"name": module.name, "class": description.class, "interface": format!("{:08x}", description.hash())})

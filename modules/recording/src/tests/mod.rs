@@ -11,6 +11,7 @@ mod failing;
 mod features;
 mod flipped;
 mod foreign;
+mod large;
 mod merging;
 mod moved;
 mod ordered;

@@ -1,11 +1,12 @@
 //! Python's reader of MCAP, which others wrote, reads whole and recovered files, with all checksums, and counts alike.
-//! It decodes what is drawn, and its writer makes files that are listed here. Rerun's converter finds what is drawn,
-//! too.
+//! It decodes what is drawn, and its writer makes files that are listed here, as does that of `rosbags`. Rerun's
+//! converter finds what is drawn, too.
 //!
 //! `cargo xtask test --all` installs both and names the programs.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod bags;
 #[path = "../common/mod.rs"]
 mod common;
 mod drawn;
