@@ -22,7 +22,7 @@ pub const CHUNK_BYTES_MAX: usize = 1 << 20;
 pub const MESSAGE_BYTES_MAX: usize = 16 << 20;
 /// A record that is read, and a chunk before compression: others write long ones. A reader has some of them in memory at
 /// once.
-pub(crate) const RECORD_BYTES_MAX: usize = 128 << 20;
+pub const RECORD_BYTES_MAX: usize = 128 << 20;
 /// Memory for the descriptions of types, channels and modules in one file. Those of a robot take some megabytes.
 pub(crate) const DESCRIBED_BYTES_MAX: usize = 256 << 20;
 /// What a message takes besides its data: type, length, channel, sequence and two times.

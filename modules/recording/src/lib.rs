@@ -39,10 +39,9 @@
 //!   time use the index.
 //! - **A channel for each epoch of system time,** with the epoch in its metadata: after a step, times contradict each
 //!   other, and the epoch of a message must survive cutting and merging. The topic stays the same.
-//! - **Chunks go to the file whole, with their length.** `mcap` does so with `disable_seeking`; while it seeks, an open
-//!   chunk has no length, and readers stop before it if the writer was killed.
-//! - **Channels are described in a chunk of their own,** and again in the index: one damaged chunk costs its messages
-//!   only.
+//! - **Chunks go to the file whole, with their length:** a reader finds all of them, though the writer was killed.
+//! - **Channels are described in a chunk of their own,** in the first chunks that use them, now and then behind those,
+//!   and in the index: one damaged chunk costs its messages only.
 //! - **Each file stands alone:** session, configuration, descriptions of modules, types and channels are in each;
 //!   counts of lost messages are those since its beginning. It begins with the newest message of each channel that
 //!   is not among its first messages, in channels that say so ([`format::key::REPEATED`]): nothing counts them a second
@@ -52,6 +51,8 @@
 //! - **What other programs draw is made afterwards** ([`draw`]), or beside what is recorded ([`Options::drawn`]), in
 //!   channels that say so: Rerun shows postcard as bytes only. Replay leaves these channels out; `cut` and `merge` keep
 //!   them.
+//! - **Files of other programs stay theirs:** what is made of them has their profile, metadata and attachments, and our
+//!   words mean nothing there.
 //!
 //! Knows no mailbox, no module and no clock but that of its periods: times are arguments.
 

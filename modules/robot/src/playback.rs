@@ -174,6 +174,8 @@ mod tests {
             (vec![5.0, 0.0, 5.5, 6e-62, 6.0], 1.0, vec![0, 500, 1000], 2, "stamps next to 0"),
             (vec![5.0, 5.5, 4.6, 5.75], 1.0, vec![0, 500, 500, 750], 0, "slightly behind is held"),
             (vec![5.0, 5.5, 4.4], 1.0, vec![0, 500], 1, "more than a second behind"),
+            (vec![5.0, 5.5, 5.5, 5.5, 6.0], 1.0, vec![0, 500, 500, 500, 1000], 0, "equal stamps, each is played"),
+            (vec![5.0, 5.5, 5.0, 5.5, 6.0], 1.0, vec![0, 500, 500, 500, 1000], 0, "two lines that stand there twice"),
             (vec![5.0, 1e9, 5.5], 1.0, vec![0, 500], 1, "one stamp of the far future"),
             (vec![5.0, 905.0, 905.5, 906.0], 1.0, vec![0, 10_000, 10_500], 1, "a pause of 900 s"),
             (vec![0.0, 1e9, 1e9, 1e9 + 1.0], 1.0, vec![0, 10_000, 11_000], 1, "the first stamp was wrong"),

@@ -154,6 +154,24 @@ fn assert_same(found: &str, expected: &str, what: &str) {
     assert_eq!(found.lines().count(), expected.lines().count(), "{what}");
 }
 
+/// A log that has three records of one stamp, lines that stand there twice, and records behind others by less and by
+/// more than the bound.
+#[test]
+fn equal_late_and_repeated_stamps_are_taken_as_the_log_has_them() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/stamps.log");
+    let lines = read(&path);
+    for (lateness_ns, gap_max_ns, late_wanted) in
+        [(10_000_000, 500_000_000, 6), (200_000_000, 500_000_000, 3), (300_000_000, 1_000_000_000, 0)]
+    {
+        let mut asking = Asking::new(lateness_ns, gap_max_ns);
+        for line in &lines {
+            asking.take(line);
+        }
+        assert_eq!(asking.late, late_wanted, "bound {lateness_ns} ns");
+        assert_same(&asking.finish(), &script(&path, lateness_ns, gap_max_ns), &format!("bound {lateness_ns} ns"));
+    }
+}
+
 #[test]
 fn each_scan_gets_the_right_two_records_or_the_right_reason() {
     let path = log();

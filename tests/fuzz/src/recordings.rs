@@ -85,7 +85,7 @@ fn described(path: &Path) {
 fn read(path: &Path) {
     let Ok(mut reader) = Reader::open(path) else { return };
     while let Ok(Some((channel, message))) = reader.next() {
-        assert!(message.data.len() <= rohrpost_recording::format::MESSAGE_BYTES_MAX * 2);
+        assert!(message.data.len() <= rohrpost_recording::format::RECORD_BYTES_MAX);
         let _ = channel.ty.as_ref().map(|ty| rohrpost_modules::schema::decode(ty, message.data));
     }
     if let Ok(true) = reader.seek(LATER_NS) {

@@ -43,13 +43,14 @@ def records(path):
 
 
 def answer(known, newest, lateness, gap_max, asked):
-    """`known` is sorted; of records with one stamp, the first in the log answers."""
+    """`known` is sorted; of records with one stamp, the last in the log answers."""
     after = bisect.bisect_left(known, (asked, 0))
     if not known:
         return "empty"
     if after == len(known):
         return f"not yet {asked + lateness - newest}"
-    stamp, line = known[after]
+    stamp = known[after][0]
+    line = known[bisect.bisect_right(known, (stamp, math.inf)) - 1][1]
     if stamp + lateness > newest:
         return f"not yet {stamp + lateness - newest}"
     if stamp == asked:
