@@ -66,7 +66,7 @@ impl Definition {
     /// What channels have in common that are told as one: a topic of ours has a channel for each epoch. Channels of
     /// others with different texts are different ones.
     pub(crate) fn identity(&self) -> ChannelIdentity<'_> {
-        let schema = (*self.schema != SchemaText::default()).then(|| Arc::as_ptr(&self.schema));
+        let schema = (*self.schema != SchemaText::default()).then_some(Arc::as_ptr(&self.schema));
         let texts = || self.texts.iter().filter(|(key, _)| *key != key::REPEATED).chain(&self.unheeded);
         let texts = self.schema.ty().is_none().then(|| texts().collect());
         (&self.topic, &self.message_encoding, schema, texts)
