@@ -46,6 +46,7 @@ pub(crate) struct TimePlan {
     is_closed: bool,
     /// What is wrong with the file first.
     damage: Option<(u64, Damage)>,
+    held_bytes_max: usize,
 }
 
 /// Messages that follow each other in time.
@@ -82,7 +83,7 @@ impl TimePlan {
         damage: Option<(u64, Damage)>,
     ) -> Self {
         stretches.sort_by_key(|its| (its.first_ns, its.begins));
-        Self { definitions, stretches: Arc::new(stretches), is_closed, damage }
+        Self { definitions, stretches: Arc::new(stretches), is_closed, damage, held_bytes_max: HELD_BYTES_MAX }
     }
 
     fn by_reading(path: &Path) -> Result<Self, ReadError> {
@@ -155,6 +156,7 @@ struct Ordered {
     /// The next message of each.
     earliest: BinaryHeap<Reverse<(u64, u64)>>,
     held_bytes: usize,
+    held_bytes_max: usize,
     read_bytes: u64,
     from_ns: u64,
     damage: Option<(u64, Damage)>,
@@ -183,6 +185,7 @@ impl Ordered {
             held: BTreeMap::new(),
             earliest: BinaryHeap::new(),
             held_bytes: 0,
+            held_bytes_max: plan.held_bytes_max,
             read_bytes: 0,
             from_ns,
             damage: plan.damage,
@@ -231,7 +234,7 @@ impl Ordered {
             match item {
                 Item::Message(its) if its.header.log_time >= self.from_ns => {
                     let bytes = self.contents.data(&its);
-                    if self.held_bytes + data.len() + bytes.len() > HELD_BYTES_MAX {
+                    if self.held_bytes + data.len() + bytes.len() > self.held_bytes_max {
                         return Err(self.contents.too_much(FileLimit::Disorder));
                     }
                     found.push(its.copied(bytes, &mut data));
@@ -250,5 +253,73 @@ impl Ordered {
             self.held.insert(begins, held);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mcap::WriteOptions;
+    use mcap::records::MessageHeader;
+
+    const BYTES: usize = 10_000;
+
+    /// A file with these chunks, each with messages of these times.
+    fn file(chunks: &[&[u64]]) -> tempfile::NamedTempFile {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let mut writer = WriteOptions::new().chunk_size(None).compression(None).create(file.reopen().unwrap()).unwrap();
+        let channel_id = writer.add_channel(0, "/a", "raw", &BTreeMap::new()).unwrap();
+        for times in chunks {
+            for log_time in *times {
+                let header = MessageHeader { channel_id, sequence: 0, log_time: *log_time, publish_time: 0 };
+                writer.write_to_known_channel(&header, &[7; BYTES]).unwrap();
+            }
+            writer.flush().unwrap();
+        }
+        writer.finish().unwrap();
+        file
+    }
+
+    /// When messages come, and what is told behind them.
+    fn times(plan: &TimePlan, path: &Path) -> (Vec<u64>, Option<ReadError>) {
+        let mut all = Vec::new();
+        for told in plan.read(path, 0).unwrap() {
+            match told {
+                Ok(batch) => all.extend(batch.found.iter().map(|found| found.header.log_time)),
+                Err(error) => return (all, Some(error)),
+            }
+        }
+        (all, None)
+    }
+
+    #[test]
+    fn as_much_is_held_as_overlaps_and_no_more() {
+        for (chunks, chunks_held) in [
+            (&[&[3, 1, 2][..], &[6, 5, 4], &[7, 9, 8]][..], 1),
+            (&[&[7, 1, 8], &[9, 2, 3], &[5, 4, 6]], 3),
+            (&[&[9, 8, 7], &[1, 2, 3], &[6, 5, 4]], 1),
+        ] {
+            let file = file(chunks);
+            let mut plan = TimePlan::of(file.path()).unwrap();
+            plan.held_bytes_max = chunks_held * 4 * BYTES;
+            let (told, error) = times(&plan, file.path());
+            assert_eq!((told, error.map(|error| error.to_string())), ((1..10).collect(), None), "{chunks:?}");
+            plan.held_bytes_max = (chunks_held * 3 - 1) * BYTES;
+            let error = times(&plan, file.path()).1.unwrap();
+            assert!(matches!(error, ReadError::TooMuch { limit: FileLimit::Disorder, .. }), "{chunks:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_behind_the_last_message() {
+        let file = file(&[&[3, 1, 2], &[6, 5, 4]]);
+        let bytes = std::fs::read(file.path()).unwrap();
+        let mut frames = Frames::open(file.path()).unwrap();
+        let last = Index::read(&mut frames).unwrap().chunks[1].chunk_start_offset as usize;
+        let cut = last + 9 + 40 + 2 * BYTES + 1_000;
+        std::fs::write(file.path(), &bytes[..cut]).unwrap();
+        let (told, error) = times(&TimePlan::of(file.path()).unwrap(), file.path());
+        assert_eq!(told, [1, 2, 3, 5, 6], "one is cut off");
+        assert!(matches!(error, Some(ReadError::Damaged { what: Damage::Cut, .. })), "{error:?}");
     }
 }

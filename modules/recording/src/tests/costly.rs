@@ -90,3 +90,26 @@ fn damages_are_counted_and_the_first_are_listed() {
         assert_eq!((told.damage_count, told.damages.len()), (10_000, listed));
     }
 }
+
+/// Each chunk seems to have all that follow in it, and to end where no record begins.
+#[test]
+fn nested_records_are_not_read_as_often_as_there_are_bytes() {
+    const CHUNKS: usize = 10_000;
+    const BYTES: u64 = 64;
+    let folder = memory_folder();
+    let path = folder.path().join("nested.mcap");
+    let mut bytes = mcap::MAGIC.to_vec();
+    for number in 0..CHUNKS as u64 {
+        let len = (CHUNKS as u64 - number) * BYTES - 9 - 5;
+        // One byte more than its body says it has: its end is not to be trusted.
+        let packed = len - 40 - 1;
+        let head =
+            [&[OP_CHUNK][..], &len.to_le_bytes(), &[0; 16], &packed.to_le_bytes(), &1_u32.to_le_bytes(), &[0; 4]];
+        let mut chunk = [&head.concat()[..], &packed.to_le_bytes()].concat();
+        chunk.resize(BYTES as usize, 0);
+        bytes.extend(chunk);
+    }
+    std::fs::write(&path, bytes).unwrap();
+    let told = recover(&path, &folder.path().join("new.mcap"), &mut |_, _| {}).unwrap();
+    assert!(told.messages == 0 && told.damage_count > 2 && told.damage_count < 200, "{told:?}");
+}
