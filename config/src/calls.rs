@@ -1,8 +1,25 @@
 //! The list `calls`: the modules that a module sends commands to.
 
 use crate::directory::Directory;
+use crate::module::Module;
 use crate::reader::Item;
 use rohrpost_mailbox::Name;
+
+/// Why a module names a less important one in its `calls`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Downwards {
+    /// It subscribes to data of it, and calls nothing: that waits for nobody.
+    Subscribes,
+    /// The file's reason.
+    Although(String),
+}
+
+impl Module {
+    /// Whether its `calls` has this name for subscriptions alone.
+    pub fn subscribes_alone(&self, to: Name) -> bool {
+        self.downwards.contains(&(to, Downwards::Subscribes))
+    }
+}
 
 /// A list `calls`, read.
 #[derive(Default)]
@@ -11,14 +28,14 @@ pub(crate) struct Calls {
     /// Line of each name.
     pub(crate) lines: Vec<usize>,
     /// The names with a reason, and the reason.
-    pub(crate) although: Vec<(Name, String)>,
+    pub(crate) downwards: Vec<(Name, Downwards)>,
 }
 
 impl Calls {
     pub(crate) fn read(list: &Item<'_>, directory: &Directory<'_>, what: &str) -> Self {
         let mut calls = Self::default();
         for item in list.list("[\"motor.0\"]").unwrap_or_default() {
-            let Some((text, although)) = entry(&item, what) else { continue };
+            let Some((text, downwards)) = entry(&item, what) else { continue };
             match directory.find(text) {
                 Ok(name) if calls.names.contains(&name) && name != Name::NONE => {
                     item.reader.report(item.line, format!("{what} names `{text}` twice in `calls`; drop one"));
@@ -26,7 +43,7 @@ impl Calls {
                 Ok(name) => {
                     calls.names.push(name);
                     calls.lines.push(item.line);
-                    calls.although.extend(although.map(|why| (name, why.into())));
+                    calls.downwards.extend(downwards.map(|why| (name, why)));
                 }
                 Err(unknown) => item.reader.report(
                     item.line,
@@ -41,17 +58,22 @@ impl Calls {
     }
 }
 
-/// A name alone, or a table of a name and the reason why it may be called.
-fn entry<'d>(item: &Item<'d>, what: &str) -> Option<(&'d str, Option<&'d str>)> {
+/// A name alone, or a table of a name and the reason why it may be there.
+fn entry<'d>(item: &Item<'d>, what: &str) -> Option<(&'d str, Option<Downwards>)> {
     if !item.is_table() {
         return Some((item.text_of_list("motor.0")?, None));
     }
     let section = item.section(&format!("{what}, calls"))?;
     let to = section.required("to", "to = \"output.0\"").and_then(|item| item.text("output.0"));
-    let example = "a picture may wait for it";
-    let although = section.required("although", &format!("although = \"{example}\""));
-    let although = although.and_then(|item| item.text(example));
+    let subscribes = section.get("subscribes").and_then(|item| item.flag());
+    let downwards = if subscribes == Some(true) {
+        Downwards::Subscribes
+    } else {
+        let example = "a picture may wait for it";
+        let although = section.required("although", &format!("although = \"{example}\""));
+        // A reason that could not be read has its own message, and counts nevertheless.
+        Downwards::Although(although.and_then(|item| item.text(example)).unwrap_or_default().into())
+    };
     section.finish();
-    // A reason that could not be read has its own message, and counts nevertheless.
-    Some((to?, Some(although.unwrap_or_default())))
+    Some((to?, Some(downwards)))
 }
