@@ -102,12 +102,9 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
 fn module(installation: &Installation, module: &Module) -> Value {
     let text = |name: &Name| installation.classes.format(*name);
     let calls = module.calls.iter().map(|to| {
-        let why = module.downwards.iter().find(|(name, _)| name == to).map(|(_, why)| why);
-        let although = match why {
-            Some(Downwards::Although(why)) => Some(why),
-            Some(Downwards::Subscribes) | None => None,
-        };
-        json!({ "to": text(to), "although": although, "subscribes": module.subscribes_alone(*to) })
+        let why = module.downwards.why(*to);
+        let although = if let Some(Downwards::Although(why)) = why { Some(why) } else { None };
+        json!({ "to": text(to), "although": although, "subscribes": module.downwards.subscribes(*to) })
     });
     let runs = match &module.program {
         Program::Builtin(name) => json!({ "builtin": name }),

@@ -11,7 +11,8 @@ const MODE: u32 = 0o644;
 /// Replaces a file, or makes it: a reader, also after a power cut, finds the old one or the new one. A symbolic link
 /// stays, and what is no file, such as a pipe, is written to.
 pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), String> {
-    replace(path, text).map_err(|error| format!("{} cannot be written: {error}", path.display()))
+    let advice = "name a file in a folder that is there and that you may write to";
+    replace(path, text).map_err(|error| format!("{} cannot be written: {error}; {advice}", path.display()))
 }
 
 fn replace(path: &Path, text: &str) -> io::Result<()> {
@@ -22,13 +23,14 @@ fn replace(path: &Path, text: &str) -> io::Result<()> {
         return File::options().write(true).open(&path)?.write_all(text.as_bytes());
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let opened = File::open(folder)?;
     let mut file = tempfile::Builder::new().prefix(".rohrpost-").tempfile_in(folder)?;
     file.write_all(text.as_bytes())?;
     let permissions = there.map_or_else(|| PermissionsExt::from_mode(MODE), |there| there.permissions());
     file.as_file().set_permissions(permissions)?;
     file.as_file().sync_all()?;
     file.persist(&path).map_err(|error| error.error)?;
-    File::open(folder)?.sync_all()
+    opened.sync_all()
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! The list `calls`: the modules that a module sends commands to.
 
 use crate::directory::Directory;
-use crate::module::Module;
 use crate::reader::Item;
 use rohrpost_mailbox::Name;
 
@@ -14,10 +13,19 @@ pub enum Downwards {
     Although(String),
 }
 
-impl Module {
-    /// Whether its `calls` has this name for subscriptions alone.
-    pub fn subscribes_alone(&self, to: Name) -> bool {
-        self.downwards.contains(&(to, Downwards::Subscribes))
+/// The names of a list `calls` that may have a less important class, each with the reason.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DownwardCalls(Vec<(Name, Downwards)>);
+
+impl DownwardCalls {
+    /// Why this name may have a less important class.
+    pub fn why(&self, to: Name) -> Option<&Downwards> {
+        self.0.iter().find(|(name, _)| *name == to).map(|(_, why)| why)
+    }
+
+    /// Whether the name is there for subscriptions alone.
+    pub fn subscribes(&self, to: Name) -> bool {
+        self.why(to) == Some(&Downwards::Subscribes)
     }
 }
 
@@ -27,8 +35,8 @@ pub(crate) struct Calls {
     pub(crate) names: Vec<Name>,
     /// Line of each name.
     pub(crate) lines: Vec<usize>,
-    /// The names with a reason, and the reason.
-    pub(crate) downwards: Vec<(Name, Downwards)>,
+    /// The names with a reason.
+    pub(crate) downwards: DownwardCalls,
 }
 
 impl Calls {
@@ -43,7 +51,7 @@ impl Calls {
                 Ok(name) => {
                     calls.names.push(name);
                     calls.lines.push(item.line);
-                    calls.downwards.extend(downwards.map(|why| (name, why)));
+                    calls.downwards.0.extend(downwards.map(|why| (name, why)));
                 }
                 Err(unknown) => item.reader.report(
                     item.line,

@@ -47,7 +47,7 @@ fn importance(installation: &Installation, module: &Module, to: Name, line: usiz
     // The kernel and the mailboxes know the class of the process, not of an alias.
     let Some(host) = installation.module(to) else { return };
     let (own, other) = (module.name.class(), host.name.class());
-    let why = module.downwards.iter().find(|(name, _)| *name == to).map(|(_, why)| why);
+    let why = module.downwards.why(to);
     let (name, called) = (classes.format(module.name), classes.format(to));
     if other < own && why.is_none() {
         let in_process = if host.name == to {

@@ -238,13 +238,13 @@ impl Page<'_> {
         self.entry("runs", &runs(module));
         self.entry("starts", &starts(module));
         self.entry("when it ends", &restart(&module.restart));
-        let calls = |name: &Name| !module.subscribes_alone(*name);
+        let calls = |name: &Name| !module.downwards.subscribes(*name);
         self.entry("calls", &self.names(module.calls.iter().copied().filter(calls)));
         if module.calls.iter().any(|name| !calls(name)) {
             self.entry("subscribes", &self.names(module.calls.iter().copied().filter(|name| !calls(name))));
         }
-        for (to, why) in &module.downwards {
-            if let Downwards::Although(why) = why {
+        for to in &module.calls {
+            if let Some(Downwards::Although(why)) = module.downwards.why(*to) {
                 self.entry("although", &format!("{} is less important: {why}", self.name(*to)));
             }
         }

@@ -1,6 +1,6 @@
 //! Modules: what runs where, with which settings, and what happens when it ends.
 
-use crate::calls::{Calls, Downwards};
+use crate::calls::{Calls, DownwardCalls};
 use crate::directory::Directory;
 use crate::mailbox::{MailboxLines, Mailboxes, TRANSIT, lines_at};
 use crate::node::Node;
@@ -101,7 +101,7 @@ pub struct Module {
     /// Modules and aliases it sends commands to; subscribing is a command too.
     pub calls: Vec<Name>,
     /// The members of [`calls`](Self::calls) that may have a less important class, and why.
-    pub downwards: Vec<(Name, Downwards)>,
+    pub downwards: DownwardCalls,
     /// Settings of its own; [`Installation::settings_as`](crate::Installation::settings_as) gives them a type.
     pub settings: toml::Table,
     /// State after launch.
@@ -153,7 +153,7 @@ impl Module {
             // A robot starts even if its certificates or its link beyond the LAN are missing.
             required: ![TCP_CLIENT, TCP_ROUTER].contains(&builtin),
             calls: Vec::new(),
-            downwards: Vec::new(),
+            downwards: DownwardCalls::default(),
             settings: toml::Table::new(),
             start: Start::On,
             restart,

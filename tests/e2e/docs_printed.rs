@@ -1,6 +1,6 @@
 //! What README and the book show of the tools is what the tools print: each command that needs no more than the demo is
-//! run on it; those of README in `readme.rs`. Numbers and times differ from run to run, and how the kernel schedules from user to user; headers, rows
-//! and words do not.
+//! run on it; those of README in `readme.rs`. Numbers and times differ from run to run, and how the kernel schedules
+//! from user to user; headers, rows and words do not.
 
 use crate::harness::{Place, wait};
 use std::fs;

@@ -335,7 +335,7 @@ impl Context {
             tracing::warn!(
                 "it calls {module}, which its `calls` does not name; add it, so that `check` can count on it"
             );
-        } else if wish == Wish::Call && me.subscribes_alone(name) {
+        } else if wish == Wish::Call && me.downwards.subscribes(name) {
             tracing::warn!(
                 "it calls {module}, and its `calls` says that it only subscribes; drop `subscribes = true` there"
             );
