@@ -181,7 +181,8 @@ pub(super) fn body_of(function: &Function, texts: &[String]) -> Result<Vec<u8>, 
 fn typed(ty: &Type, text: &str) -> Result<Value, Failure> {
     let is_json = match text.chars().next() {
         Some('{' | '[') => !is_word(some_of(ty)),
-        Some('"') => !is_word(ty),
+        // A text in quotes is the text.
+        Some('"') => !is_word(ty) || serde_json::from_str::<String>(text).is_ok(),
         _ => false,
     };
     if is_json { Ok(serde_json::from_str(text)?) } else { Ok(parse_argument(ty, text)?) }

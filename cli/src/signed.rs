@@ -11,7 +11,7 @@ pub(crate) fn options_first(program: &Command, words: impl IntoIterator<Item = O
     let mut words: Vec<OsString> = words.into_iter().collect();
     let Some(command) = words.get(1).and_then(|name| program.find_subcommand(name)) else { return words };
     let takes_numbers = command.get_positionals().any(Arg::is_allow_negative_numbers_set);
-    if !takes_numbers || !words[2..].iter().any(|word| is_number_below_zero(word)) {
+    if !takes_numbers || !words[2..].iter().any(is_number_below_zero) {
         return words;
     }
     let (mut options, mut values, mut rest) = (Vec::new(), Vec::new(), words.split_off(2).into_iter());
