@@ -55,15 +55,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Ok(())
     };
     let tell = |watched: &mut WatchedModule| {
+        let module = watched.name();
         let sum_of = |which: &dyn Fn(&FlowInfo) -> bool| sum(watched.tracks.figures().filter(|(flow, _)| which(flow)));
         if wanted.is_none() {
             let to = sum_of(&|flow| flow.to.module() == watched.module);
             let from = sum_of(&|flow| flow.from.module() == watched.module);
-            return Ok(tell_one(arguments, "in", "in", &to) && tell_one(arguments, "out", "out", &from));
+            return Ok(
+                tell_one(arguments, &module, "in", "in", &to) && tell_one(arguments, &module, "out", "out", &from)
+            );
         }
         let sums: Vec<FlowSum> =
             data.iter().map(|(number, _)| sum_of(&|flow| flow.kind == Type::data(*number))).collect();
-        let told = data.iter().zip(&sums).all(|((_, name), sum)| tell_one(arguments, name, "published", sum));
+        let told = data.iter().zip(&sums).all(|((_, name), sum)| tell_one(arguments, &module, name, "published", sum));
         watched.renew(&mut data, wanted);
         Ok(told)
     };
@@ -72,12 +75,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 /// Prints one line; false when nobody reads any more.
-fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &FlowSum) -> bool {
+fn tell_one(arguments: &Arguments, module: &str, name: &str, direction: &str, sum: &FlowSum) -> bool {
     if !arguments.pace.json {
         return say_folded(sum.text(name));
     }
     say(json!({
-        "module": arguments.name,
+        "module": module,
         "data": arguments.data,
         "direction": direction,
         "packages": sum.packages,

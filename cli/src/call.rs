@@ -7,7 +7,8 @@ use crate::terminal::{Failure, say, say_folded};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::output::plain;
 use rohrpost::schema::{
-    DataKind, Description, Function, Value, decode, describe_field, describe_result, encode, parse_argument,
+    DataKind, Description, Function, Type, Value, decode, describe_field, describe_result, encode, is_word,
+    parse_argument,
 };
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
@@ -105,7 +106,7 @@ fn answer(
     };
     let text = match &value {
         _ if arguments.json => serde_json::to_string(&value)?,
-        Value::Variant(_, why) if failed => format!("{} answers with an error: {why}", arguments.name),
+        Value::Variant(_, why) if failed => format!("{} answers with an error: {why}", running.text(module)),
         Value::Null => "ok".into(),
         value => value.to_string(),
     };
@@ -170,15 +171,26 @@ pub(super) fn body_of(function: &Function, texts: &[String]) -> Result<Vec<u8>, 
     }
     let mut body = Vec::new();
     for (argument, text) in function.arguments.iter().zip(texts) {
-        let value = match text.chars().next() {
-            Some('{' | '[' | '"') => {
-                serde_json::from_str(text).map_err(|error| format!("{}: {error}", argument.name))?
-            }
-            _ => parse_argument(&argument.ty, text).map_err(|error| format!("{}: {error}", argument.name))?,
-        };
+        let value = typed(&argument.ty, text).map_err(|error| format!("{}: {error}", plain::line(&argument.name)))?;
         body.extend(encode(&argument.ty, &value).map_err(|error| format!("{}: {error}", argument.name))?);
     }
     Ok(body)
+}
+
+/// What a user types for a value: JSON, if it begins as such and no word is a value of the type; else a word.
+fn typed(ty: &Type, text: &str) -> Result<Value, Failure> {
+    let is_json = match text.chars().next() {
+        Some('{' | '[') => !is_word(some_of(ty)),
+        // A text in quotes is the text.
+        Some('"') => !is_word(ty) || serde_json::from_str::<String>(text).is_ok(),
+        _ => false,
+    };
+    if is_json { Ok(serde_json::from_str(text)?) } else { Ok(parse_argument(ty, text)?) }
+}
+
+/// The type behind options.
+fn some_of(ty: &Type) -> &Type {
+    if let Type::Option(some) = ty { some_of(some) } else { ty }
 }
 
 /// A function with the names and types of its arguments.

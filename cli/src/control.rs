@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
     let running = arguments.target.find()?;
     let name = running.module(&arguments.name)?;
     let module = running.installation.module(name).ok_or_else(|| {
-        format!("the configuration has no module `{}`; `rohrpost list` shows which there are", arguments.name)
+        format!("the configuration has no module `{}`; `rohrpost list` shows which there are", running.text(name))
     })?;
     let text = running.text(module.name);
     let node = running.node_of(module.name);

@@ -91,7 +91,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let tell = |observed: &mut ObservedDelays| {
         observed.module.renew(&mut names, None);
-        let delays = delays(&arguments.name, observed, &names);
+        let module = observed.module.name();
+        let delays = delays(&module, observed, &names);
         Ok(say(if arguments.pace.json { serde_json::to_string(&delays)? } else { in_text(&delays) }))
     };
     arguments.pace.watch(&mut observed, look, tell)?;

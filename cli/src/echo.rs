@@ -51,8 +51,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 fn echo(arguments: &Arguments, running: &Running, module: Name, tool: &mut ToolLink) -> Result<(), Failure> {
     let description = tool.describe(module)?;
-    let item =
-        choose(&description, arguments.data.as_deref()).map_err(|error| format!("{}: {error}", arguments.name))?;
+    let item = choose(&description, arguments.data.as_deref())
+        .map_err(|error| format!("{}: {error}", running.text(module)))?;
     if let Some(why) = too_large_for_data(running, module, item) {
         return Err(why);
     }

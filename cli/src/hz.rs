@@ -44,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         for (number, name) in &data {
             let figures = watched.figures(*number);
             let is_read = if arguments.pace.json {
-                say(in_json(&arguments.name, name, figures))
+                say(in_json(&watched.name(), name, figures))
             } else {
                 say_folded(in_text(&plain::line(name), wide, figures))
             };

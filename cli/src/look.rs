@@ -2,6 +2,7 @@
 //! call waits longer than [`PATIENCE`]; a node that does not answer is silent, and the tool reports that.
 
 use crate::observer::{PATIENCE, Silence, silence};
+use crate::summary::Account;
 use crate::target::Running;
 use crate::terminal::Failure;
 use rohrpost::ToolLink;
@@ -12,10 +13,11 @@ use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInt
 use rohrpost::launcher::{SnapshotRequest, launcher_of};
 use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
-use rohrpost::survey::{MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
+use rohrpost::survey::{MailboxSnapshot, Scope, Snapshot, Standing, Survey, look_at_all};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{InspectError, Name};
+use std::collections::BTreeSet;
 
 impl Running {
     /// Observes these nodes, all at the same time. Returns, in their order, what each reports, or why it does not
@@ -163,7 +165,7 @@ impl Running {
     /// The module, alias or manually started program that a user names: one of the configuration, with mailboxes here,
     /// of another system, or of this one and registered at the TCP router.
     pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
-        let module = self.installation.classes.parse_name(text)?.module();
+        let module = self.name(text)?.module();
         let is_other = self.is_beyond(module) && module.system() != self.installation.system.id;
         if is_other || self.is_known(module) || self.is_here(module) || self.is_hosted_beyond(module) {
             return Ok(module);
@@ -171,9 +173,45 @@ impl Running {
         Err(unknown_module(&self.installation, text))
     }
 
+    /// The mailbox that a user names; a class alone is its one module.
+    pub(super) fn name(&self, text: &str) -> Result<Name, Failure> {
+        parse_name(&self.installation, text, || self.node.mailboxes().unwrap_or_default())
+    }
+
+    /// What is known of a module that did not answer in time; none where nothing tells it from one that does.
+    pub(super) fn standing_of_silent(&self, module: Name) -> Option<String> {
+        let survey = self.look(self.node_of(module), Scope::Module(module.raw())).ok()?;
+        let Account { state, error, .. } = Account::of(survey.module(module)?, &self.installation);
+        let is_told = matches!(state, Standing::Error) || !state.answers();
+        is_told.then(|| error.map_or_else(|| format!("it is {state}"), |error| format!("it is {state}: {error}")))
+    }
+
     /// Runs a query from the tool's place on its own node.
     fn ask<T>(&self, ask: impl FnOnce(&mut ToolLink) -> T) -> Result<T, Failure> {
         self.observer.with(|| self.join(PATIENCE), ask)
+    }
+}
+
+/// A name as users type it. A class alone is its one module, of the configuration or with mailboxes `here`.
+pub(super) fn parse_name(
+    installation: &Installation,
+    text: &str,
+    here: impl FnOnce() -> Vec<Name>,
+) -> Result<Name, Failure> {
+    let classes = &installation.classes;
+    let Some(class) = classes.id(text) else { return Ok(classes.parse_name(text)?) };
+    let known = installation.modules.iter().flat_map(|module| module.names());
+    let all = known
+        .chain(here().into_iter().map(Name::module))
+        .filter(|name| name.class() == class && name.system() == installation.system.id);
+    let all: BTreeSet<Name> = all.collect();
+    match *Vec::from_iter(&all) {
+        [] => Err(format!("there is no module of class `{text}`; `rohrpost list` shows what runs").into()),
+        [only] => Ok(*only),
+        ref several => {
+            let texts: Vec<String> = several.iter().map(|name| classes.format(**name)).collect();
+            Err(format!("`{text}` may be {}; say which", texts.join(" or ")).into())
+        }
     }
 }
 

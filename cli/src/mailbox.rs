@@ -121,7 +121,7 @@ struct VictimLine {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
-    let name = running.installation.classes.parse_name(&arguments.name)?;
+    let name = running.name(&arguments.name)?;
     let look = running.inspect(name)?.ok_or_else(|| missing(&running, name, &arguments.name))?;
     let seen = MailboxView::new(&running, &look);
     if arguments.json {

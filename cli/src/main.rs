@@ -51,6 +51,7 @@ mod round;
 mod router;
 mod run;
 mod send;
+mod signed;
 mod slots;
 mod speech;
 mod status;
@@ -66,6 +67,7 @@ mod units;
 mod version;
 mod vocabulary;
 mod watch;
+mod whole_file;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
@@ -160,7 +162,9 @@ enum Command {
 
 fn main() -> ExitCode {
     completions::answer(Arguments::command);
-    let matches = help::grouped(Arguments::command()).get_matches();
+    let command = help::grouped(Arguments::command());
+    let words = signed::options_first(&command, std::env::args_os());
+    let matches = command.get_matches_from(words);
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match arguments.command {
         Command::Check(arguments) => check::run(&arguments),

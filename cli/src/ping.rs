@@ -46,6 +46,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let module = running.module(&arguments.name)?;
+    let name = running.text(module);
     let (interval, timeout) = (seconds(arguments.interval)?, seconds(arguments.timeout)?);
     let stop = Stop::new()?;
     let mut tool = running.join(timeout)?;
@@ -63,13 +64,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
                 let moments = Moments { before: &before, there: &there, after: &after };
                 let one_way = RoundTrip::new(&moments, running.is_own(module), pace);
                 rounds.answered(took, one_way.as_ref().ok());
-                tell_answer(arguments, rounds.sent, took, &one_way)
+                tell_answer(arguments, &name, rounds.sent, took, &one_way)
             }
             // It has answered, if only that it does not know this function.
             Err(CallError::Fault(_, Fault::Unknown(_))) => {
                 rounds.answered(took, None);
                 let why = "the module was built with a Rohrpost that returns no time; rebuild it".into();
-                tell_answer(arguments, rounds.sent, took, &Err(why))
+                tell_answer(arguments, &name, rounds.sent, took, &Err(why))
             }
             Err(error) => tell_loss(arguments, &running, module, rounds.sent, &error),
         };
@@ -80,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
     }
     tool.close();
-    let summary = if arguments.json { rounds.json(&arguments.name) } else { rounds.text(&arguments.name) };
+    let summary = if arguments.json { rounds.json(&name) } else { rounds.text(&name) };
     say_folded(summary);
     if rounds.answered == 0 {
         return Err(why_silent(&running, module)?.into());
@@ -88,8 +89,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn tell_answer(arguments: &Arguments, number: u64, took: Duration, one_way: &Result<RoundTrip, String>) -> bool {
-    let name = &arguments.name;
+fn tell_answer(
+    arguments: &Arguments,
+    name: &str,
+    number: u64,
+    took: Duration,
+    one_way: &Result<RoundTrip, String>,
+) -> bool {
     if arguments.json {
         let (one_way, why) = (one_way.as_ref().ok(), one_way.as_ref().err());
         return say(json!({
@@ -111,10 +117,11 @@ fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64
         CallError::Timeout(_, time) => format!("no answer within {time:?}"),
         error => running.told(module, error).to_string(),
     };
+    let name = running.text(module);
     if arguments.json {
-        return say(json!({"module": arguments.name, "number": number, "round_trip_s": null, "error": why}));
+        return say(json!({"module": name, "number": number, "round_trip_s": null, "error": why}));
     }
-    say_folded(format_args!("{}: none {number}: {why}", arguments.name))
+    say_folded(format_args!("{name}: none {number}: {why}"))
 }
 
 /// What shared memory shows of a module that does not answer, and what to do.
@@ -123,6 +130,7 @@ fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
     let survey = running.look(running.node_of(module), Scope::Module(module.raw()))?;
     let found = survey.module(module);
     Ok(match found.and_then(|found| found.process.as_ref().map(|process| (found, process))) {
+        Some(_) if let Some(why) = running.standing_of_silent(module) => format!("{name} answered nothing: {why}"),
         Some((found, process)) => format!(
             "{name} answered nothing: its process {} is there, its state is {}, and {} packages wait for it; it \
              hangs, was stopped (kill -CONT {0} goes on), or works longer than that: see `rohrpost log --module \

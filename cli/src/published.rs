@@ -73,6 +73,11 @@ impl WatchedModule {
         })
     }
 
+    /// The module's name.
+    pub(super) fn name(&self) -> String {
+        self.running.text(self.module)
+    }
+
     /// The module's present state; none while its node is away, which is reported once.
     pub(super) fn look(&mut self) -> Result<Option<Survey>, Failure> {
         let own = self.running.is_own(self.module);

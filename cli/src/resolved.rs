@@ -4,8 +4,8 @@
 
 use rohrpost::Name;
 use rohrpost_config::{
-    Installation, Level, MailboxSpec, Module, Program, Reach, RecordedItems, Recording, RestartPolicy, Sampling,
-    Scheduling, Start, StreamSpec, TimeSource, bounds,
+    Downwards, Installation, Level, MailboxSpec, Module, Program, Reach, RecordedItems, Recording, RestartPolicy,
+    Sampling, Scheduling, Start, StreamSpec, TimeSource, bounds,
 };
 use rohrpost_mailbox::LAYOUT_VERSION;
 use rohrpost_network::{Bound, FlowBound, Network, Tdma};
@@ -102,8 +102,9 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
 fn module(installation: &Installation, module: &Module) -> Value {
     let text = |name: &Name| installation.classes.format(*name);
     let calls = module.calls.iter().map(|to| {
-        let although = module.although.iter().find(|(name, _)| name == to).map(|(_, why)| why);
-        json!({ "to": text(to), "although": although })
+        let why = module.downwards.why(*to);
+        let although = if let Some(Downwards::Although(why)) = why { Some(why) } else { None };
+        json!({ "to": text(to), "although": although, "subscribes": module.downwards.subscribes(*to) })
     });
     let runs = match &module.program {
         Program::Builtin(name) => json!({ "builtin": name }),

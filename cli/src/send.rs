@@ -51,7 +51,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let period = Duration::from_secs_f64(1.0 / arguments.rate);
     let timeout = seconds(arguments.timeout)?;
     let description = running.describe(module)?;
-    let function = description.function(&arguments.function).ok_or_else(|| no_function(arguments, &description))?;
+    let function = description
+        .function(&arguments.function)
+        .ok_or_else(|| no_function(arguments, &running.text(module), &description))?;
     let body = body_of(function, &arguments.arguments)?;
     let stop = Stop::new()?;
     let mut sending = Sending {
@@ -90,8 +92,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 /// Why there is nothing to send. Functions that every module has, such as `off`, need no repetition.
-fn no_function(arguments: &Arguments, description: &Description) -> String {
-    let (name, function) = (&arguments.name, &arguments.function);
+fn no_function(arguments: &Arguments, name: &str, description: &Description) -> String {
+    let function = &arguments.function;
     if COMMON.iter().any(|(common, _)| common == function) {
         return format!("`{function}` needs no repetition: `rohrpost call {name} {function}`");
     }

@@ -204,6 +204,13 @@ impl Running {
         if let Some(router) = self.missing_router(&text) {
             return router;
         }
+        let text = match text.split_once("; ") {
+            // The lower layers can only guess why.
+            Some((late, _)) if late.starts_with(&format!("no answer from {module} within ")) => {
+                self.standing_of_silent(module).map_or_else(|| text.clone(), |why| format!("{late}; {why}"))
+            }
+            _ => text,
+        };
         plain::line(&text.replace(&module.to_string(), &self.text(module))).into()
     }
 

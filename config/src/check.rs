@@ -3,6 +3,7 @@
 mod access;
 mod replica;
 
+use crate::calls::Downwards;
 use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::module::{Lines, Module};
@@ -46,9 +47,9 @@ fn importance(installation: &Installation, module: &Module, to: Name, line: usiz
     // The kernel and the mailboxes know the class of the process, not of an alias.
     let Some(host) = installation.module(to) else { return };
     let (own, other) = (module.name.class(), host.name.class());
-    let although = module.although.iter().any(|(name, _)| *name == to);
+    let why = module.downwards.why(to);
     let (name, called) = (classes.format(module.name), classes.format(to));
-    if other < own && !although {
+    if other < own && why.is_none() {
         let in_process = if host.name == to {
             String::new()
         } else {
@@ -59,12 +60,13 @@ fn importance(installation: &Installation, module: &Module, to: Name, line: usiz
             format!(
                 "module `{name}`, of priority {}, calls `{called}`, of priority {}{in_process}: it would wait for \
                  something that all others go before; give one of them another class, or say why it may: \
-                 `{{ to = \"{called}\", although = \"…\" }}`",
+                 `{{ to = \"{called}\", although = \"…\" }}`, or with `subscribes = true` that it only subscribes, \
+                 which waits for nobody",
                 own.0, other.0
             ),
         );
     }
-    if other >= own && although {
+    if other >= own && matches!(why, Some(Downwards::Although(_))) {
         reader.report(
             line,
             format!(

@@ -5,6 +5,7 @@ mod record;
 mod slots;
 mod timeline;
 
+use crate::calls::Downwards;
 use crate::installation::Installation;
 use crate::mailbox::TRANSIT;
 use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start, TCP_CLIENT, TCP_ROUTER};
@@ -237,9 +238,15 @@ impl Page<'_> {
         self.entry("runs", &runs(module));
         self.entry("starts", &starts(module));
         self.entry("when it ends", &restart(&module.restart));
-        self.entry("calls", &self.names(module.calls.iter().copied()));
-        for (to, why) in &module.although {
-            self.entry("although", &format!("{} is less important: {why}", self.name(*to)));
+        let calls = |name: &Name| !module.downwards.subscribes(*name);
+        self.entry("calls", &self.names(module.calls.iter().copied().filter(calls)));
+        if module.calls.iter().any(|name| !calls(name)) {
+            self.entry("subscribes", &self.names(module.calls.iter().copied().filter(|name| !calls(name))));
+        }
+        for to in &module.calls {
+            if let Some(Downwards::Although(why)) = module.downwards.why(*to) {
+                self.entry("although", &format!("{} is less important: {why}", self.name(*to)));
+            }
         }
         let callers =
             self.installation.modules.iter().filter(|other| module.names().any(|own| other.calls.contains(&own)));
@@ -248,10 +255,10 @@ impl Page<'_> {
             let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
             self.entry("settings", &settings.join(", "));
         }
-        let values = self.installation.saved.as_ref().map(|saved| saved.values(self.installation, module.name));
-        if let Some(Ok(values)) = values.filter(|values| values.as_ref().is_ok_and(|values| !values.is_empty())) {
-            let text = |saved: &SavedValue<toml::Value>| format!("{} = {}", saved.name, saved.value);
-            self.entry("saved", &values.iter().map(text).collect::<Vec<_>>().join(", "));
+        let saved = self.installation.saved.as_ref().map(|saved| saved.texts(module.name)).unwrap_or_default();
+        if !saved.is_empty() {
+            let text = |saved: &SavedValue<&str>| format!("{} = {}", saved.name, saved.value);
+            self.entry("saved", &saved.iter().map(text).collect::<Vec<_>>().join(", "));
         }
         for (key, spec) in module.mailboxes.each() {
             self.entry(key, &memory::mailbox(spec));

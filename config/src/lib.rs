@@ -75,6 +75,7 @@ mod time;
 mod units;
 
 pub use access::Access;
+pub use calls::{DownwardCalls, Downwards};
 pub use classes::{ClassEntry, ClassTable, GUI, NameTextError, ROUTER, TCP, TOOL};
 pub use contents::{Contents, ContentsError};
 pub use digest::Digest;

@@ -1,6 +1,6 @@
 //! Modules: what runs where, with which settings, and what happens when it ends.
 
-use crate::calls::Calls;
+use crate::calls::{Calls, DownwardCalls};
 use crate::directory::Directory;
 use crate::mailbox::{MailboxLines, Mailboxes, TRANSIT, lines_at};
 use crate::node::Node;
@@ -100,8 +100,8 @@ pub struct Module {
     pub required: bool,
     /// Modules and aliases it sends commands to; subscribing is a command too.
     pub calls: Vec<Name>,
-    /// The members of [`calls`](Self::calls) with a less important class, and the file's reasons for them.
-    pub although: Vec<(Name, String)>,
+    /// The members of [`calls`](Self::calls) that may have a less important class, and why.
+    pub downwards: DownwardCalls,
     /// Settings of its own; [`Installation::settings_as`](crate::Installation::settings_as) gives them a type.
     pub settings: toml::Table,
     /// State after launch.
@@ -153,7 +153,7 @@ impl Module {
             // A robot starts even if its certificates or its link beyond the LAN are missing.
             required: ![TCP_CLIENT, TCP_ROUTER].contains(&builtin),
             calls: Vec::new(),
-            although: Vec::new(),
+            downwards: DownwardCalls::default(),
             settings: toml::Table::new(),
             start: Start::On,
             restart,
@@ -238,7 +238,7 @@ impl Context<'_> {
             optional,
             required,
             calls: calls.names,
-            although: calls.although,
+            downwards: calls.downwards,
             settings,
             start: start.unwrap_or_default(),
             restart,

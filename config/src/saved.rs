@@ -6,6 +6,7 @@ use crate::module::Module;
 use crate::reader::{Item, Reader, Section, line_of, nearest};
 use rohrpost_mailbox::Name;
 use serde::de::DeserializeOwned;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
@@ -105,6 +106,18 @@ impl Saved {
         }
         values.sort_by_key(|(at, _)| *at);
         Ok(values.into_iter().map(|(_, value)| value).collect())
+    }
+
+    /// The values of a module as the file writes them, in its order.
+    pub fn texts(&self, module: Name) -> Vec<SavedValue<&str>> {
+        let Some(table) = self.table(module) else { return Vec::new() };
+        let entry = |(key, value): (&Spanned<Cow<'_, str>>, &Spanned<DeValue<'_>>)| {
+            let (at, text) = (key.span().start, self.text.get(value.span()).unwrap_or_default());
+            (at, SavedValue { name: key.get_ref().to_string(), line: line_of(&self.text, at), value: text })
+        };
+        let mut texts: Vec<_> = table.get_ref().iter().map(entry).collect();
+        texts.sort_by_key(|(at, _)| *at);
+        texts.into_iter().map(|(_, text)| text).collect()
     }
 
     /// Refuses values for names that are no parameter of the module.

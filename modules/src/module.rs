@@ -176,6 +176,18 @@ impl ModuleError {
         Self { text: format!("{place}: {text}"), errno }
     }
 
+    /// The same with the number of the kernel's error that is behind it, where a language other than Rust tells it.
+    ///
+    /// ```
+    /// use rohrpost_modules::ModuleError;
+    ///
+    /// assert_eq!(ModuleError::new("the map is not there").with_errno(Some(2)).errno(), Some(2));
+    /// ```
+    #[must_use]
+    pub fn with_errno(self, errno: Option<u16>) -> Self {
+        Self { errno, ..self }
+    }
+
     /// The number of the kernel's error, if one is behind it.
     pub fn errno(&self) -> Option<u16> {
         self.errno

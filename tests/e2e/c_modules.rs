@@ -139,7 +139,7 @@ pub(crate) fn compiled(place: &Place, source: &Path) -> PathBuf {
     let is_c = source.extension().unwrap() == "c";
     let (compiler, standard) = if is_c { ("cc", "-std=c11") } else { ("c++", "-std=c++17") };
     let output = Command::new(compiler)
-        .args([standard, "-Wall", "-Wextra", "-Werror", "-D_GNU_SOURCE"])
+        .args([standard, "-Wall", "-Wextra", "-Wshadow", "-Werror", "-D_GNU_SOURCE"])
         .args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-o"])
         .arg(&program)
         .arg(source)

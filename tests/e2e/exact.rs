@@ -171,6 +171,15 @@ fn simulator_pilot_and_mapper_of_a_loaded_and_disturbed_run_repeat_exactly() {
     drop(robot);
     launch.stop();
 
+    // The book shows a command of the pilot as it is told.
+    let listed = place.say(&["replay", "--exact", "--list", file.to_str().unwrap(), "pilot.0"]).ok();
+    for line in include_str!("../../docs/src/exact.md").lines().filter(|line| line.contains("it sends a command: ")) {
+        let (front, behind) = line.split_once(" bytes ").unwrap();
+        let (front, behind) = (front.split_once("it sends").unwrap().1, behind.rsplit_once(" to ").unwrap().1);
+        let is_it = |told: &&str| told.contains(front) && told.ends_with(&format!(" to {behind}"));
+        assert!(listed.lines().any(|told| is_it(&told)), "{line}");
+    }
+
     let times = std::env::var(REPLAYS).ok().and_then(|times| times.parse().ok()).unwrap_or(2);
     for _ in 0..times {
         let runs = replayed(&place, &file, &[]);

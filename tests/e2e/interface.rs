@@ -20,6 +20,13 @@ fn interfaces_of_built_in_classes_are_known_and_made_into_code_where_nothing_run
     ] {
         let code = place.say(&["interface", "generate", "--lang", lang, file]).ok();
         assert!(code.contains(has), "{has}: {code}");
+        // Into a file whole, or not at all: what is there stays when nothing can be made.
+        let output = place.path(lang);
+        let into = ["interface", "generate", "--lang", lang, "-o", lang];
+        assert_eq!(place.say(&[&into[..], &[file]].concat()).ok(), "");
+        assert_eq!(std::fs::read_to_string(&output).unwrap(), code);
+        place.say(&[&into[..], &["gone.json"]].concat()).fails();
+        assert_eq!(std::fs::read_to_string(&output).unwrap(), code);
     }
     let config = place.config(&["[[module]]\nname = \"probe.0\"\nprogram = \"probe\"\n"]);
     let config = config.to_str().unwrap();

@@ -141,7 +141,7 @@ fn mailboxes_that_are_not_there_or_not_ours_are_told_with_what_would_be_right() 
             "node main has no mailbox `probe.5`; did you mean `probe.0`? `rohrpost list --mailboxes` lists all",
         ),
         ("porbe.0", "there is no class `porbe`; did you mean `probe`?"),
-        ("probe", "probe"),
+        ("prob", "`prob` is no mailbox name; write class.instance"),
     ] {
         let told = place.say(&["mailbox", name]).fails();
         assert!(told.contains(words), "{name}: {told}");

@@ -8,6 +8,7 @@
 
 mod access;
 mod all_nodes;
+mod arguments;
 mod bench;
 mod beyond;
 mod beyond_strangers;
@@ -21,6 +22,7 @@ mod control;
 mod crash;
 mod demo;
 mod demo_recorded;
+mod docs_printed;
 mod doctor;
 mod exact;
 mod exact_records;
@@ -54,6 +56,7 @@ mod other_users;
 mod output;
 mod output_log;
 mod param;
+mod param_edges;
 mod ping_send;
 mod printed;
 mod probe;

@@ -183,6 +183,13 @@ fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
     // Functions that others call.
     for (words, told) in [
         (&["fail", "broken"][..], format!("RuntimeError: broken (./gripper.py:{})", line("raise RuntimeError(why)"))),
+        (
+            &["fail", "missing"],
+            format!(
+                "FileNotFoundError: [Errno 2] No such file or directory: '/no/such/file' (./gripper.py:{})",
+                line("open(\"/no/such/file\")")
+            ),
+        ),
         (&["leave"], format!("SystemExit: 3 (./gripper.py:{})", line("sys.exit(3)"))),
         (&["wrong"], "the result of `wrong` cannot be written: 300 is out of range: u8 is 0 to 255".into()),
     ] {
@@ -192,6 +199,13 @@ fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
         let status = scene.says(&["status", "gripper.0"]).out;
         assert!(status.contains("error") && status.contains(&told), "{status}");
         again();
+    }
+    // Lines have the number of the kernel's error that they tell of.
+    let lines = scene.says(&["log", "--module", "gripper.0", "--json"]).ok();
+    let lines: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    for (errno, words) in [(2, "FileNotFoundError: "), (28, "no room: [Errno 28] No space left on device")] {
+        let told = lines.iter().find(|line| line["text"].as_str().unwrap().starts_with(words));
+        assert_eq!(told.map(|line| &line["errno"]), Some(&errno.into()), "{lines:?}");
     }
     // Those that run with a picture; a view that is kept.
     for (order, told) in [("fail", "RuntimeError: it is dark ("), ("keep", "Misuse: a view of record ")] {

@@ -1,5 +1,6 @@
 //! The module that README shows is launched by the very lines that README shows.
 
+use crate::docs_printed::{Compared, difference, shown};
 use crate::harness::{Place, wait};
 use std::fs;
 use std::path::Path;
@@ -23,6 +24,8 @@ fn the_module_of_the_readme_is_launched_by_five_lines_and_known_to_all_tools() {
     let module = module.replace("../target/debug/examples/compass", built.to_str().unwrap());
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
     let demo = fs::read_to_string(folder.join("demo.toml")).unwrap();
+    // Whether the bridge was built, or not.
+    let demo = demo.replace("rohrpost-gui-bridge\"", "not-there\"");
     let demo = demo.replacen("[nodes.main]", &format!("{class}\n\n[nodes.main]"), 1);
     let config = place.path("demo.toml");
     fs::write(&config, format!("{demo}\n{module}\n")).unwrap();
@@ -37,6 +40,11 @@ fn the_module_of_the_readme_is_launched_by_five_lines_and_known_to_all_tools() {
     let values: Vec<serde_json::Value> = echoed.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(values.len(), 2);
     assert!(values.iter().all(|line| line["value"].as_f64().is_some_and(|bearing| (0.0..360.0).contains(&bearing))));
+    let shown = shown("README.md");
+    assert_eq!(shown.len(), 4, "what README shows of tools");
+    let wrong = |(command, lines): &(String, Vec<String>)| difference(&place, command, lines, Compared::Whole);
+    let wrong: Vec<String> = shown.iter().filter_map(wrong).collect();
+    assert!(wrong.is_empty(), "README.md is to be corrected:\n\n{}", wrong.join("\n\n\n"));
     // How the kernel schedules what is not real time is no matter of rights.
     let listed = place.say(&["list", "--json"]).json();
     let nice = |name: &str| {

@@ -98,7 +98,7 @@ fn mistakes_are_told_with_what_would_be_right() {
     let _launch = node(&place);
     for (arguments, words) in [
         (&["call", "prob.0"][..], &["prob"][..]),
-        (&["call", "probe"], &["probe"]),
+        (&["call", "prob"], &["`prob` is no mailbox name; write class.instance"]),
         (&["call", "probe.x", "count", "1"], &["probe.x"]),
         (&["call", "probe.999", "count", "1"], &["999"]),
         (

@@ -71,15 +71,21 @@ fn lan_that_works() -> LanView {
 }
 
 fn lan_of_trouble() -> LanView {
-    let no_way = Reach::NoWay("Network is unreachable (os error 101)".into());
     let refused = PortState::Refused("Permission denied (os error 13)".into());
     LanView {
         is_here: false,
         addresses: vec![("eth0".into(), [192, 168, 0, 7].into()), ("wlan0".into(), "fd00::7".parse().unwrap())],
         runs: false,
         stamps: Stamps::NoSent,
-        ..lan([PortState::InUse, refused.clone(), refused], &[("arm", 1280, Reach::Silent), ("desk", 1500, no_way)])
+        ..lan([PortState::InUse, refused.clone(), refused], &[("arm", 1280, Reach::Neighbour)])
     }
+}
+
+/// What the kernel knows of the way to a peer that does not answer is no matter.
+fn lan_with_peers_of_trouble() -> LanView {
+    let no_way = Reach::NoWay("Network is unreachable (os error 101)".into());
+    let peers = [("arm", 1280, Reach::Silent), ("desk", 1280, no_way), ("cart", 1280, Reach::NoRouter)];
+    lan([PortState::InUse, PortState::Free, PortState::Free], &peers)
 }
 
 fn sealed(ids: Result<Vec<u8>, String>, lacking: Vec<String>) -> Protection {
@@ -141,16 +147,18 @@ fn too_little_room_in_run() -> (KernelFacts, Needs) {
         base: "/run/rohrpost/main".into(),
         room: Some(Room { bytes: 64 << 20, free: 60 << 20 }),
         bridge: Some(Bridge { path: "/opt/rohrpost/rohrpost-gui-bridge".into(), pid: None }),
+        lan: Some(lan_with_peers_of_trouble()),
         ..nothing_told()
     };
     (asked, Needs { memory: 70 << 20, from: Some("robot.toml".into()), ..Needs::default() })
 }
 
 fn elsewhere() -> (KernelFacts, Needs) {
+    let peers = [("arm", 1400, Reach::Silent), ("desk", 1400, Reach::Neighbour)];
     let lan = LanView {
         addresses: Vec::new(),
         stamps: Stamps::None("Protocol not available".into()),
-        ..LanView { is_here: false, ..lan([PortState::Unknown, PortState::Unknown, PortState::Unknown], &[]) }
+        ..LanView { is_here: false, ..lan([PortState::Unknown, PortState::Unknown, PortState::Unknown], &peers) }
     };
     let asked = KernelFacts { lan: Some(lan), protection: open(), ..nothing_told() };
     (asked, Needs { from: Some("robot.toml".into()), ..Needs::default() })

@@ -12,6 +12,7 @@ use super::units::{Stop, bytes, seconds};
 use super::vocabulary::{Vocabulary, answered};
 use super::watch::Tracks;
 use crate::terminal::{Failure, say};
+use crate::whole_file::write_whole;
 use parts::{Carries, Edge, Graph, Module};
 use rohrpost::Name;
 use rohrpost::survey::{Scope, StreamSurvey, Survey, is_hop};
@@ -71,12 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         in_text(&graph)
     };
     match &arguments.output {
-        Some(file) => {
-            let failed = |error| {
-                format!("{}: {error}; name a file in a folder that is there and that you may write to", file.display())
-            };
-            std::fs::write(file, text + "\n").map_err(failed)?;
-        }
+        Some(file) => write_whole(file, &(text + "\n"))?,
         None => {
             say(text);
         }

@@ -24,18 +24,19 @@ mod texts;
 
 use super::target::Target;
 use crate::terminal::{Failure, say, say_folded};
+use crate::whole_file::write_whole;
 use rohrpost::output::plain;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost interface export motor.0                     shows what motor.0 offers
-  rohrpost interface export motor.0 --json > motor.json
+  rohrpost interface export motor.0 --json -o motor.json
   rohrpost interface export motor --json                the same of a built-in class, where nothing runs
-  rohrpost interface generate --lang rust motor.json > motor.rs
-  rohrpost interface generate --lang python motor.json > motor.py
-  rohrpost interface generate --lang c motor.json > motor.h")]
+  rohrpost interface generate --lang rust motor.json -o motor.rs
+  rohrpost interface generate --lang python motor.json -o motor.py
+  rohrpost interface generate --lang c motor.json -o motor.h")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     action: InterfaceCommand,
@@ -56,6 +57,9 @@ struct Export {
     /// Write a file for `generate`; without it, a list for people.
     #[arg(long)]
     json: bool,
+    /// Write into this file, whole or not at all.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
     #[command(flatten)]
     target: Target,
 }
@@ -67,6 +71,9 @@ struct Generate {
     lang: Language,
     /// What `export --json` wrote.
     file: PathBuf,
+    /// Write into this file, whole or not at all.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -83,21 +90,30 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.action {
         InterfaceCommand::Export(export) => {
             let description = export::find(&export.name, &export.target)?;
-            if export.json {
-                say(file::write(&description)?);
-            } else {
-                say_folded(crate::call::listing(&description));
+            match (export.json, &export.output) {
+                (true, output) => put(output.as_deref(), &file::write(&description)?)?,
+                (false, Some(output)) => put(Some(output), &crate::call::listing(&description))?,
+                (false, None) => _ = say_folded(crate::call::listing(&description)),
             }
         }
-        InterfaceCommand::Generate(Generate { lang, file }) => {
+        InterfaceCommand::Generate(Generate { lang, file, output }) => {
             let code = file::load(file)
                 .map_err(Failure::from)
                 .and_then(|description| Ok(generated(&description, *lang)?))
                 .map_err(|error| format!("{}: {error}", plain::line(&file.display().to_string())))?;
-            say(code.trim_end());
+            put(output.as_deref(), code.trim_end())?;
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Into a file, or printed.
+fn put(output: Option<&Path>, text: &str) -> Result<(), Failure> {
+    match output {
+        Some(file) => write_whole(file, &format!("{text}\n"))?,
+        None => _ = say(text),
+    }
+    Ok(())
 }
 
 fn generated(description: &rohrpost::schema::Description, lang: Language) -> Result<String, refusal::Refusal> {

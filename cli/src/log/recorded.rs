@@ -3,7 +3,7 @@
 use super::arguments::Arguments;
 use super::filter::Filter;
 use super::show::Show;
-use crate::look::unknown_module;
+use crate::look::{parse_name, unknown_module};
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;
 use rohrpost::output::{OutputLine, plain};
@@ -71,7 +71,7 @@ fn recorded_installation(infos: &[Info]) -> Result<Installation, Failure> {
 
 /// The module, alias or tool of this name.
 fn find(text: &str, installation: &Installation) -> Result<Name, Failure> {
-    let name = installation.classes.parse_name(text)?.module();
+    let name = parse_name(installation, text, Vec::new)?.module();
     let is_known = installation.module(name).is_some() || name.class() == installation.classes.tool();
     if is_known { Ok(name) } else { Err(unknown_module(installation, text)) }
 }

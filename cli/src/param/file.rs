@@ -1,13 +1,14 @@
 //! The file that `param save` writes: TOML that people can read and `param load` can load.
 
 use crate::terminal::Failure;
+use crate::whole_file::write_whole;
 use rohrpost::output::plain;
-use rohrpost::parameter::{Parameter, toml_text};
+use rohrpost::parameter::{Parameter, Refusal, toml_key, toml_text};
+use rohrpost::schema::Field;
 use rohrpost_config::{Installation, Saved};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 
 /// The file's content, by module name.
@@ -28,41 +29,34 @@ impl Contents {
         let mut modules = BTreeMap::new();
         for module in saved.modules() {
             let mut text = String::new();
-            for saved in saved.values::<toml::Value>(installation, module)? {
-                let _ = writeln!(text, "{} = {}", key(&saved.name), saved.value);
+            for saved in saved.texts(module) {
+                let _ = writeln!(text, "{} = {}", toml_key(&saved.name), saved.value);
             }
             modules.insert(installation.classes.format(module), text);
         }
         Ok(Self { modules })
     }
 
-    /// Replaces a module's entries.
-    pub(super) fn put(&mut self, module: &str, parameters: &[Parameter]) -> Result<(), Failure> {
-        let mut text = String::new();
+    /// Replaces a module's entries. Returns those that its next start would refuse, which the file does not get.
+    pub(super) fn put(&mut self, module: &str, parameters: &[Parameter]) -> Vec<Refusal> {
+        let (mut text, mut refusals) = (String::new(), Vec::new());
         for parameter in parameters {
+            let Field { name, ty, text: purpose, .. } = &parameter.field;
             let range = parameter.field.with_unit(&parameter.range());
-            let _ = writeln!(text, "# {} ({})", one_line(&parameter.field.text), one_line(&range));
-            let _ = writeln!(text, "{} = {}", key(&parameter.field.name), toml_text(&parameter.value()?));
+            match parameter.checked() {
+                Ok(value) => {
+                    let _ = writeln!(text, "# {} ({})", one_line(purpose), one_line(&range));
+                    let _ = writeln!(text, "{} = {}", toml_key(name), toml_text(ty, &value));
+                }
+                Err(refusal) => refusals.push(refusal),
+            }
         }
         self.modules.insert(module.to_owned(), text);
-        Ok(())
+        refusals
     }
 
-    /// Replaces the file atomically: a reader, also after a power cut, finds the old file or the new one.
     pub(super) fn write(&self, path: &Path, installation: &Installation) -> Result<(), Failure> {
-        // The target of a symbolic link, so that the link stays.
-        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let told = |error: std::io::Error| format!("{} cannot be written: {error}", path.display());
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut file = tempfile::Builder::new().prefix(".parameters-").tempfile_in(folder).map_err(told)?;
-        file.write_all(self.text(installation).as_bytes()).map_err(told)?;
-        let permissions = std::fs::metadata(&path).map(|there| there.permissions());
-        let permissions = permissions.unwrap_or_else(|_| std::os::unix::fs::PermissionsExt::from_mode(0o644));
-        file.as_file().set_permissions(permissions).map_err(told)?;
-        file.as_file().sync_all().map_err(told)?;
-        file.persist(&path).map_err(|error| told(error.error))?;
-        std::fs::File::open(folder).and_then(|folder| folder.sync_all()).map_err(told)?;
-        Ok(())
+        Ok(write_whole(path, &self.text(installation))?)
     }
 
     fn text(&self, installation: &Installation) -> String {
@@ -75,15 +69,10 @@ impl Contents {
             installation.name
         );
         for (module, values) in &self.modules {
-            let _ = write!(text, "\n[{}]\n{values}", toml::Value::from(module.as_str()));
+            let _ = write!(text, "\n[{}]\n{values}", toml_key(module));
         }
         text
     }
-}
-
-fn key(name: &str) -> String {
-    let bare = !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_'));
-    if bare { name.into() } else { toml::Value::from(name).to_string() }
 }
 
 /// Text for a comment: a module's text must end with the line.

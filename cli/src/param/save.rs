@@ -22,8 +22,10 @@ pub(super) fn run(session: &mut Session, names: &[String], output: Option<&Path>
         let name = session.running.text(owner);
         match session.parameters(owner) {
             Ok(parameters) if !parameters.is_empty() => {
-                contents.put(&name, &parameters)?;
-                saved.push(format!("{name} ({})", parameters.len()));
+                let refusals = contents.put(&name, &parameters);
+                saved.push(format!("{name} ({})", parameters.len() - refusals.len()));
+                let told = |refusal| format!("{name}: not saved, since its next start would refuse it: {refusal}");
+                failures.extend(refusals.into_iter().map(told));
             }
             Ok(_) if names.is_empty() => {}
             Ok(_) => failures.push(no_parameters(&name)),

@@ -11,6 +11,7 @@ use std::process::ExitCode;
 
 pub(super) fn run(session: &mut Session, name: &str, parameter: &str, value: &str) -> Result<ExitCode, Failure> {
     let module = session.running.module(name)?;
+    let name = &session.running.text(module);
     let parameters = session.parameters(module)?;
     let wanted = find(&parameters, name, parameter)?;
     let bytes = from_word(&wanted.field.ty, value).map_err(|error| format!("`{parameter}`: {error}"))?;

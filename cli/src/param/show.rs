@@ -48,6 +48,7 @@ pub(super) fn list(session: &mut Session, name: Option<&str>, json: bool) -> Res
 /// The parameters of a module, or one of them.
 pub(super) fn get(session: &mut Session, name: &str, parameter: Option<&str>, json: bool) -> Result<ExitCode, Failure> {
     let module = session.running.module(name)?;
+    let name = &session.running.text(module);
     let all = session.parameters(module)?;
     let shown = match parameter {
         Some(parameter) => std::slice::from_ref(find(&all, name, parameter)?),

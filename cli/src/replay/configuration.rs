@@ -241,7 +241,7 @@ impl ReplayWish<'_> {
                 call.as_str().or_else(|| call.get("to").and_then(Value::as_str)).unwrap_or_default().to_owned()
             };
             calls.retain(|call| is_there(&name(call)));
-            // `although` is for less important ones, and the player is none.
+            // A reason is for less important ones, and the player is none.
             let is_played = |name: &str| played.described.contains_key(name) && player >= module.name.class().0;
             calls.iter_mut().filter(|call| is_played(&name(call))).for_each(|call| *call = name(call).into());
         }

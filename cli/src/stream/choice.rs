@@ -74,18 +74,17 @@ pub(super) fn writer_text(module: Option<&str>, pid: Option<u32>) -> String {
 impl StreamChoice {
     pub(super) fn find(&self) -> Result<ChosenStream, Failure> {
         let running = node_here(&self.target)?;
-        let name = running.installation.classes.parse_name(&self.stream)?;
-        let node = running.node_of(name);
+        let name = running.name(&self.stream)?;
+        let (node, text) = (running.node_of(name), running.text(name));
         if node != running.node_name && !has_replica(&running, name) {
             return Err(format!(
-                "{} is a module of node {node}, and a stream lies in the memory of its node; use `--node {node}` on \
-                 its computer",
-                self.stream
+                "{text} is a module of node {node}, and a stream lies in the memory of its node; use `--node {node}` \
+                 on its computer"
             )
             .into());
         }
         let description = noted(&running.node, name);
-        let (number, item) = find_item(&self.stream, &self.item, description.as_ref())?;
+        let (number, item) = find_item(&text, &self.item, description.as_ref())?;
         Ok(ChosenStream { id: StreamId { name, number }, item, running })
     }
 }
@@ -202,7 +201,7 @@ pub(crate) fn completed_names(target: &Target) -> Vec<String> {
 /// Streams of the module that one of these words names, for completions: by name, with a text, where that is known.
 pub(crate) fn completed_items(target: &Target, words: &[String]) -> Vec<(String, String)> {
     let Ok(running) = target.find() else { return Vec::new() };
-    let named = words.iter().find_map(|word| running.installation.classes.parse_name(word).ok());
+    let named = words.iter().find_map(|word| running.name(word).ok());
     let all = running.node.streams().unwrap_or_default();
     let item = |id: &StreamId| match item_of(&running, *id) {
         Some(item) => (item.field.name, item.field.text),

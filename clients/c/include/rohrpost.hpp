@@ -274,31 +274,31 @@ public:
     // Until it is told to end; the exit code of the process.
     int run(const rohrpost_interface &interface, int count, char **arguments,
         const std::vector<rohrpost_parameter> &parameters = {}) {
-        rohrpost_module module{};
-        module.interface = &interface;
-        module.parameters = parameters.data();
-        module.parameter_count = parameters.size();
-        module.user = this;
-        module.made = [](void *user) { return caught(user, [](Module &module) { module.made(); }); };
-        module.on = [](void *user) { return caught(user, [](Module &module) { module.on(); }); };
-        module.off = [](void *user) { caught(user, [](Module &module) { module.off(); }); };
-        module.tick = [](void *user) { return caught(user, [](Module &module) { module.tick(); }); };
-        module.command = [](void *user, uint16_t number, rohrpost_decoder *arguments, rohrpost_encoder *reply) {
+        rohrpost_module table{};
+        table.interface = &interface;
+        table.parameters = parameters.data();
+        table.parameter_count = parameters.size();
+        table.user = this;
+        table.made = [](void *user) { return caught(user, [](Module &module) { module.made(); }); };
+        table.on = [](void *user) { return caught(user, [](Module &module) { module.on(); }); };
+        table.off = [](void *user) { caught(user, [](Module &module) { module.off(); }); };
+        table.tick = [](void *user) { return caught(user, [](Module &module) { module.tick(); }); };
+        table.command = [](void *user, uint16_t number, rohrpost_decoder *given, rohrpost_encoder *reply) {
             bool is_there = false;
             rohrpost_outcome outcome = caught(
-                user, [&](Module &module) { is_there = module.command(number, *arguments, *reply); });
+                user, [&](Module &module) { is_there = module.command(number, *given, *reply); });
             return outcome < 0 || is_there ? outcome : rohrpost_outcome{ROHRPOST_NO_ITEM};
         };
-        module.received = [](void *user, const rohrpost_followed *data) {
+        table.received = [](void *user, const rohrpost_followed *data) {
             return caught(user, [&](Module &module) { module.received(*data); });
         };
-        module.ready = [](void *user, const rohrpost_ready *ready) {
+        table.ready = [](void *user, const rohrpost_ready *ready) {
             return caught(user, [&](Module &module) { module.ready(*ready); });
         };
-        module.parameters_changed = [](void *user, const char *const *names, size_t count) {
-            return caught(user, [&](Module &module) { module.parameters_changed({names, names + count}); });
+        table.parameters_changed = [](void *user, const char *const *names, size_t changed) {
+            return caught(user, [&](Module &module) { module.parameters_changed({names, names + changed}); });
         };
-        return rohrpost_module_run(&module, count, const_cast<const char *const *>(arguments));
+        return rohrpost_module_run(&table, count, const_cast<const char *const *>(arguments));
     }
 
 private:

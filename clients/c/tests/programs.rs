@@ -40,7 +40,7 @@ fn linked(folder: &Path, (compiler, options): (&str, &[&str]), source: &str, lib
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let program = folder.join("program");
     let output = Command::new(compiler)
-        .args(["-Wall", "-Wextra", "-Werror", "-pthread", "-D_GNU_SOURCE"])
+        .args(["-Wall", "-Wextra", "-Wshadow", "-Werror", "-pthread", "-D_GNU_SOURCE"])
         .args(options)
         .arg(here.join("tests").join(source))
         .arg("-I")

@@ -86,7 +86,7 @@ impl Following {
         item: &str,
         rate: FollowRate,
     ) -> Result<usize, NativeError> {
-        let from = context.callee(module)?;
+        let from = context.publisher(module)?;
         if rate == FollowRate::Newest && !self.has_newest {
             open_newest(context)?;
             self.has_newest = true;

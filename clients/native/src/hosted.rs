@@ -16,7 +16,7 @@ use rohrpost_schema::Value;
 use std::collections::BTreeMap;
 
 /// What the configuration says under `settings`.
-type Settings = BTreeMap<String, toml::Value>;
+type Settings = BTreeMap<String, Value>;
 
 /// Runs a module until it is told to end. `make` makes it, switched off: let it follow there what it follows.
 ///
@@ -53,14 +53,13 @@ fn served(installation: &Installation, module: Name, class: &str) -> Name {
 
 fn state(interface: NativeInterface, settings: Settings, serves: Name) -> Result<NativeState, ModuleError> {
     let NativeInterface { description, parameters, settings: known } = interface;
-    let mut parameters = Parameters::new(parameters);
+    let mut parameters = Parameters::new(parameters)?;
     let mut others = serde_json::Map::new();
     for (name, value) in settings {
-        let value = serde_json::to_value(value)?;
         if parameters.has(&name) {
-            parameters.configure(&name, &serde_json::from_value::<Value>(value)?)?;
+            parameters.configure(&name, &value)?;
         } else if known.contains(&name) {
-            others.insert(name, value);
+            others.insert(name, serde_json::to_value(value)?);
         } else {
             let own = known.iter().map(String::as_str);
             let all: Vec<&str> = parameters.names().into_iter().chain(own).collect();

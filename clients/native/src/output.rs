@@ -15,13 +15,14 @@ pub enum SayLevel {
     Trace,
 }
 
-/// Says a line, from any thread; before the module runs, nobody hears it.
-pub fn say(level: SayLevel, text: &str) {
+/// Says a line, from any thread; before the module runs, nobody hears it. `errno`: number of the kernel's error that it
+/// tells of.
+pub fn say(level: SayLevel, text: &str, errno: Option<u16>) {
     match level {
-        SayLevel::Error => tracing::error!("{text}"),
-        SayLevel::Warn => tracing::warn!("{text}"),
-        SayLevel::Info => tracing::info!("{text}"),
-        SayLevel::Debug => tracing::debug!("{text}"),
-        SayLevel::Trace => tracing::trace!("{text}"),
+        SayLevel::Error => tracing::error!(errno, "{text}"),
+        SayLevel::Warn => tracing::warn!(errno, "{text}"),
+        SayLevel::Info => tracing::info!(errno, "{text}"),
+        SayLevel::Debug => tracing::debug!(errno, "{text}"),
+        SayLevel::Trace => tracing::trace!(errno, "{text}"),
     }
 }

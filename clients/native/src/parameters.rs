@@ -1,9 +1,8 @@
 //! Parameters of a module, by their descriptions.
 
 use rohrpost_modules::ModuleError;
-use rohrpost_modules::parameter::{Parameter, ParameterSet, Refusal, from_file, value_text};
-use rohrpost_schema::{Field, Value, decode};
-use std::cmp::Ordering;
+use rohrpost_modules::parameter::{Parameter, ParameterSet, Refusal, from_file};
+use rohrpost_schema::{Field, Value, encode};
 
 /// A setting that may change while the module runs.
 #[derive(Clone, Debug)]
@@ -18,8 +17,10 @@ pub struct NativeParameter {
 pub(crate) struct Parameters(Vec<Parameter>);
 
 impl Parameters {
-    pub(crate) fn new(declared: Vec<NativeParameter>) -> Self {
-        Self(declared.into_iter().map(|NativeParameter { field, default: value }| Parameter { field, value }).collect())
+    /// The declared ones with their defaults; a refusal of the first that a file could not give back.
+    pub(crate) fn new(declared: Vec<NativeParameter>) -> Result<Self, Refusal> {
+        let of = |NativeParameter { field, default: value }| checked(Parameter { field, value });
+        declared.into_iter().map(of).collect::<Result<_, _>>().map(Self)
     }
 
     /// Whether there is one of this name.
@@ -65,17 +66,7 @@ impl ParameterSet for Parameters {
 
     fn accept(&self, index: usize, value: &[u8]) -> Result<Vec<u8>, Refusal> {
         let Parameter { field, .. } = self.0.get(index).ok_or(Refusal::NoParameters)?;
-        let refused = |text: String| Refusal::Type { name: field.name.clone(), text };
-        let decoded = decode(&field.ty, value).map_err(|error| refused(error.to_string()))?;
-        if is_within(field, &decoded) {
-            return Ok(value.to_vec());
-        }
-        let parameter = Parameter { field: field.clone(), value: value.to_vec() };
-        Err(Refusal::Range {
-            name: field.name.clone(),
-            value: field.with_unit(&value_text(&decoded)),
-            range: field.with_unit(&parameter.range()),
-        })
+        checked(Parameter { field: field.clone(), value: value.to_vec() }).map(|parameter| parameter.value)
     }
 
     fn put(&mut self, index: usize, value: &[u8]) {
@@ -85,37 +76,23 @@ impl ParameterSet for Parameters {
     }
 }
 
-/// Whether a value lies in the field's range; a number that is not finite lies in none.
-fn is_within(field: &Field, value: &Value) -> bool {
-    if let Value::F(number) = value
-        && !number.is_finite()
-    {
-        return false;
-    }
-    let (lower, upper) = field.bounds();
-    let is_least = |least: &Value| matches!(compare(value, least), Some(Ordering::Equal | Ordering::Greater));
-    let is_most = |most: &Value| matches!(compare(value, most), Some(Ordering::Equal | Ordering::Less));
-    lower.as_ref().is_none_or(is_least) && upper.as_ref().is_none_or(is_most)
-}
-
-fn compare(value: &Value, bound: &Value) -> Option<Ordering> {
-    match (value, bound) {
-        (Value::I(value), Value::I(bound)) => Some(value.cmp(bound)),
-        (Value::U(value), Value::U(bound)) => Some(value.cmp(bound)),
-        (Value::F(value), Value::F(bound)) => value.partial_cmp(bound),
-        _ => None,
-    }
+/// The parameter with its value as it is stored, if it may have that.
+fn checked(parameter: Parameter) -> Result<Parameter, Refusal> {
+    let value = parameter.checked()?;
+    let refused = |text: String| Refusal::Type { name: parameter.field.name.clone(), text };
+    let value = encode(&parameter.field.ty, &value).map_err(|error| refused(error.to_string()))?;
+    Ok(Parameter { value, ..parameter })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost_schema::{Type, encode};
+    use rohrpost_schema::Type;
 
     fn speed() -> Parameters {
         let bytes = |number: f64| number.to_le_bytes().to_vec();
         let field = Field::new("speed-m-s", Type::F64).said("", "m/s").bounded(Some(bytes(0.0)), Some(bytes(0.2)));
-        Parameters::new(vec![NativeParameter { field, default: bytes(0.05) }])
+        Parameters::new(vec![NativeParameter { field, default: bytes(0.05) }]).unwrap()
     }
 
     #[test]
@@ -133,13 +110,28 @@ mod tests {
             assert_eq!(told.err().as_deref(), expected, "{value}");
         }
         let field = Field::new("any", Type::F64);
-        let any = Parameters::new(vec![NativeParameter { field, default: vec![0; 8] }]);
+        let any = Parameters::new(vec![NativeParameter { field, default: vec![0; 8] }]).unwrap();
         for number in [f64::NAN, f64::INFINITY] {
             assert!(matches!(any.accept(0, &number.to_le_bytes()), Err(Refusal::Range { .. })), "{number}");
         }
         assert!(any.accept(0, &1e300_f64.to_le_bytes()).is_ok());
+        assert_eq!(any.accept(0, &(-0.0_f64).to_le_bytes()), Ok(vec![0; 8]), "as in Rust");
         assert!(matches!(parameters.accept(0, &[1]), Err(Refusal::Type { .. })));
         assert!(matches!(parameters.accept(1, &[1]), Err(Refusal::NoParameters)));
+    }
+
+    #[test]
+    fn a_parameter_that_no_file_gives_back_is_refused_at_the_start() {
+        let list = (Type::list(Type::F64), vec![0]);
+        for ((ty, default), expected) in [
+            (list, "`any`: a parameter is bool, an integer of at most 64 bits, f32, f64, text, or"),
+            ((Type::F64, f64::NAN.to_le_bytes().to_vec()), "`any` is NaN, out of range: f64"),
+            ((Type::U16, vec![0xff]), "`any`: "),
+        ] {
+            let told = Parameters::new(vec![NativeParameter { field: Field::new("any", ty), default }]).err();
+            let told = told.map(|refusal| refusal.to_string()).unwrap_or_default();
+            assert!(told.starts_with(expected), "{told}");
+        }
     }
 
     #[test]

@@ -56,7 +56,7 @@ class Connection:
         elif kind == ASK:
             self.write(frame(ANSWER, self._answer(struct.unpack("<Q", rest)[0], now_ns)))
         elif kind == PACKAGE:
-            self._router.carry(rest)
+            self._router.carry(rest, self)
 
     def _answer(self, asked: int, now_ns: int) -> bytes:
         return struct.pack("<6Q", asked, now_ns, now_ns, 10**18 + now_ns, 1000, 3)
@@ -92,11 +92,12 @@ class Router:
                 return connection
         return None
 
-    def carry(self, rest: bytes) -> None:
+    def carry(self, rest: bytes, by: Connection) -> None:
+        """Hands a package on, but not back: as the real one does."""
         order = ">" if rest[8 + 15] & 1 else "<"
         (to,) = struct.unpack(order + "I", rest[8:12])
         for connection in list(self.connections):
-            if any(first <= to <= last for first, last in connection.ranges):
+            if connection is not by and any(first <= to <= last for first, last in connection.ranges):
                 for _ in range(self.sees(rest[8:])):
                     connection.write(frame(PACKAGE, rest))
 

@@ -87,6 +87,11 @@ class Command(unittest.TestCase):
         code, out, _ = self.say("status", "probe.0")
         self.assertTrue(code == 0 and out.startswith("probe.0 is error: RuntimeError: "), out)
 
+    def test_numbers_below_zero_and_texts_that_begin_as_json_are_arguments(self) -> None:
+        for word in ("-1e-3", "-.5", "-inf", "-5.", "-0x1f", "-1", "-NaN", "[x", "{x}", '"x'):
+            shown = '"' + plain(word + EVIL).replace('"', '\\"') + '"'
+            self.assertEqual(self.say("call", "probe.0.echo", word), (0, f"{{words: {shown}}}\n", ""), word)
+
     def test_what_cannot_be_meant_is_told(self) -> None:
         for words, why in [
             (("call", "probe"), "`probe` names no module; write class.instance, such as motor.0"),

@@ -112,6 +112,18 @@ class Interfaces(unittest.TestCase):
             class Bad(rp.Module, klass="bad"):
                 speed: float = rp.parameter(5.0, max=1.0)
 
+        def list_parameter() -> Any:
+            class Bad(rp.Module, klass="bad"):
+                gains: list[float] = rp.parameter([1.0])
+
+        def long_parameter() -> Any:
+            class Bad(rp.Module, klass="bad"):
+                gain: rp.U128 = rp.parameter(1)
+
+        def maybe_parameter() -> Any:
+            class Bad(rp.Module, klass="bad"):
+                gain: float | None = rp.parameter(None)
+
         def klass() -> Any:
             class Bad(rp.Module): ...
 
@@ -123,6 +135,9 @@ class Interfaces(unittest.TestCase):
             (twice, "command 16 is there twice"),
             (keyword, "take arguments by position"),
             (parameter, "5 is not in its range, at most 1"),
+            (list_parameter, "Bad.gains: a parameter is bool, an integer of at most 64 bits, .*, not \\[f64\\]"),
+            (long_parameter, "an enum of words, not u128"),
+            (maybe_parameter, "an enum of words, not f64\\?"),
             (klass, "of which class is it"),
             (lambda: DriveError("Flat"), "has no variant `Flat`; there are: NotFinite, Hardware"),
             (lambda: Driver().proxy("motor.0"), "is hosted by nobody yet"),

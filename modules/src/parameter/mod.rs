@@ -48,7 +48,7 @@ mod words;
 
 pub use declared::{Declared, put_parameter};
 pub use kinds::ParameterType;
-pub use words::{from_file, from_word, toml_text, value_text};
+pub use words::{from_file, from_word, toml_key, toml_text, value_text};
 
 use crate::output::plain::line;
 use rohrpost_schema::{Field, Schema, Value, WalkError, decode};
@@ -88,6 +88,31 @@ impl Parameter {
     /// When it is not of the type: then its module is not to be believed.
     pub fn value(&self) -> Result<Value, WalkError> {
         decode(&self.field.ty, &self.value)
+    }
+
+    /// The present value, if its module takes it: of a type that a parameter can have, in its range, and a number that
+    /// is finite. Negative zero becomes zero.
+    ///
+    /// # Errors
+    /// [`Refusal::Type`] or [`Refusal::Range`].
+    pub fn checked(&self) -> Result<Value, Refusal> {
+        let Field { name, ty, .. } = &self.field;
+        let refused = |text: String| Refusal::Type { name: name.clone(), text };
+        if !kinds::is_of_parameters(ty) {
+            return Err(refused(format!("a parameter is {}, not {}", kinds::ALL, words::type_text(ty))));
+        }
+        let value = match self.value().map_err(|error| refused(error.to_string()))? {
+            Value::F(number) => Value::F(number + 0.0),
+            other => other,
+        };
+        if kinds::is_within(&value, &self.field) {
+            return Ok(value);
+        }
+        Err(Refusal::Range {
+            name: name.clone(),
+            value: self.field.with_unit(&value_text(&value)),
+            range: self.field.with_unit(&self.range()),
+        })
     }
 
     /// What values it takes, in words, without the unit: `0..=1.5`, `at least 1`, `left|right`, `f64`.

@@ -189,7 +189,8 @@ proptest! {
         let mut text = String::from("motor = \"motor.0\"\n");
         for index in 0..INDEX.len() {
             let parameter = before.get(index).unwrap();
-            text += &format!("{} = {}\n", parameter.field.name, toml_text(&parameter.value().unwrap()));
+            let value = parameter.value().unwrap();
+            text += &format!("{} = {}\n", parameter.field.name, toml_text(&parameter.field.ty, &value));
         }
         let after: Settings = toml::from_str(&text).map_err(|error| TestCaseError::fail(format!("{error}\n{text}")))?;
         prop_assert_eq!(after, before);

@@ -57,22 +57,39 @@ fn told(ty: &Type, error: &WalkError) -> String {
     error.to_string().replace(&describe_type(ty), &type_text(ty))
 }
 
-/// A value as TOML writes it, so that it reads back as the same.
+/// A value of a parameter as TOML writes it, so that it reads back as the same.
 ///
 /// ```
-/// use rohrpost_modules::{parameter::toml_text, schema::Value};
-/// assert_eq!(toml_text(&Value::unit_variant("TurnLeft")), "\"turn-left\"");
-/// assert_eq!(toml_text(&Value::F(1.0)), "1.0");
+/// use rohrpost_modules::{parameter::toml_text, schema::{Type, Value}};
+/// assert_eq!(toml_text(&Type::F64, &Value::F(1.0)), "1.0");
+/// assert_eq!(toml_text(&Type::Text, &Value::Text("a\tb".into())), r#""a\tb""#);
 /// ```
-pub fn toml_text(value: &Value) -> String {
+pub fn toml_text(ty: &Type, value: &Value) -> String {
+    let quoted = |text: String| toml::Value::String(text).to_string();
     match value {
         // In TOML it has small letters.
         Value::F(x) if x.is_nan() => "nan".into(),
         Value::F(x) => format!("{x:?}"),
-        Value::Text(text) => toml::Value::String(text.clone()).to_string(),
-        Value::Variant(..) => toml::Value::String(value_text(value)).to_string(),
+        Value::Text(text) => quoted(text.clone()),
+        Value::Variant(name, _) => {
+            // Of two variants that differ in case or hyphens alone, the word of one reads as the other, or as none.
+            let word = value_text(value);
+            let is_same = encode(ty, &Value::Text(word.clone())).ok() == encode(ty, value).ok();
+            quoted(if is_same { word } else { name.to_string() })
+        }
         other => other.to_string(),
     }
+}
+
+/// A name as the key of a line of TOML.
+///
+/// ```
+/// use rohrpost_modules::parameter::toml_key;
+/// assert_eq!((toml_key("near-m"), toml_key("two\nlines")), ("near-m".into(), r#""two\nlines""#.into()));
+/// ```
+pub fn toml_key(name: &str) -> String {
+    let line = toml::Table::from_iter([(name.to_owned(), toml::Value::Boolean(true))]).to_string();
+    line.rsplit_once(" = ").map_or_else(String::new, |(key, _)| key.to_owned())
 }
 
 /// `TurnLeft` as `turn-left`.

@@ -30,6 +30,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+/// What a module wants of another one.
+#[derive(Clone, Copy, PartialEq)]
+enum Wish {
+    Call,
+    Subscribe,
+}
+
 /// A module's connection to its node: proxies, subscriptions, publishing, time, settings.
 ///
 /// ```
@@ -260,11 +267,13 @@ impl Context {
     /// # Errors
     /// When the text names no module, or one of another class.
     pub fn proxy<P: Proxy>(&self, module: &str) -> Result<P, ContextError> {
-        Ok(P::new(&self.link, self.named(module, P::CLASS)?))
+        let (name, is_beyond) = self.of_class(module, P::CLASS)?;
+        self.warn_undeclared(module, name, is_beyond, Wish::Call);
+        Ok(P::new(&self.link, name))
     }
 
-    /// A module that this one sends commands to or subscribes to, by the text of a setting: for programs that know its
-    /// interface by a description alone.
+    /// A module that this one sends commands to, by the text of a setting: for programs that know its interface by a
+    /// description alone.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::{Context, ContextError};
@@ -277,7 +286,25 @@ impl Context {
     /// When the text names no module.
     pub fn callee(&self, module: &str) -> Result<Name, ContextError> {
         let (name, is_beyond) = self.parsed(module)?;
-        self.warn_undeclared(module, name, is_beyond);
+        self.warn_undeclared(module, name, is_beyond, Wish::Call);
+        Ok(name)
+    }
+
+    /// A module that this one subscribes to, by the text of a setting: for programs that know its interface by a
+    /// description alone.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError};
+    /// fn laser(context: &Context) -> Result<rohrpost_mailbox::Name, ContextError> {
+    ///     context.publisher("laser.0")
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// When the text names no module.
+    pub fn publisher(&self, module: &str) -> Result<Name, ContextError> {
+        let (name, is_beyond) = self.parsed(module)?;
+        self.warn_undeclared(module, name, is_beyond, Wish::Subscribe);
         Ok(name)
     }
 
@@ -293,19 +320,24 @@ impl Context {
         &self.link
     }
 
-    /// A module that this one sends commands to.
+    /// A module that this one subscribes to.
     fn named(&self, module: &str, wanted: &'static str) -> Result<Name, ContextError> {
         let (name, is_beyond) = self.of_class(module, wanted)?;
-        self.warn_undeclared(module, name, is_beyond);
+        self.warn_undeclared(module, name, is_beyond, Wish::Subscribe);
         Ok(name)
     }
 
-    fn warn_undeclared(&self, module: &str, name: Name, is_beyond: bool) {
-        // The configuration counts on `calls`: the number of callers decides how many slots a mailbox needs.
-        let declared = is_beyond || self.installation.module(self.me).is_none_or(|me| me.calls.contains(&name));
-        if !declared {
+    /// The configuration counts on `calls`: how many slots a mailbox needs, and that nobody waits for a less important
+    /// module.
+    fn warn_undeclared(&self, module: &str, name: Name, is_beyond: bool, wish: Wish) {
+        let Some(me) = self.installation.module(self.me).filter(|_| !is_beyond) else { return };
+        if !me.calls.contains(&name) {
             tracing::warn!(
                 "it calls {module}, which its `calls` does not name; add it, so that `check` can count on it"
+            );
+        } else if wish == Wish::Call && me.downwards.subscribes(name) {
+            tracing::warn!(
+                "it calls {module}, and its `calls` says that it only subscribes; drop `subscribes = true` there"
             );
         }
     }

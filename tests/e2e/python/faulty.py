@@ -77,6 +77,9 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
     @rp.command(17)
     def fail(self, why: str) -> None:
         """Fails."""
+        if why == "missing":
+            logging.warning("no room: %s", OSError(28, "No space left on device"))
+            open("/no/such/file")
         raise RuntimeError(why)
 
     @rp.command(18)

@@ -43,7 +43,7 @@ fn parameters(bytes: &[u8]) {
         let range = parameter.field.with_unit(&parameter.range());
         assert!(range.len() >= parameter.field.unit.len());
         if let Ok(value) = parameter.value() {
-            let _ = (value_text(&value), toml_text(&value));
+            let _ = (value_text(&value), toml_text(&parameter.field.ty, &value), parameter.checked());
             let _ = from_file(&parameter.field.ty, &value);
         }
         let _ = from_word(&parameter.field.ty, &parameter.field.text);

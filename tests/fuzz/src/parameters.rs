@@ -63,8 +63,8 @@ fn taken(value: &Value) {
         let Ok(bytes) = from_file(&ty, value) else { continue };
         let read = decode(&ty, &bytes).unwrap_or_else(|error| panic!("{ty:?}: {error}"));
         let _ = value_text(&read);
-        let Ok(table) = toml::from_str::<toml::Table>(&format!("x = {}", toml_text(&read))) else {
-            assert!(ty.is::<Twist>(), "`x = {}` is no TOML", toml_text(&read));
+        let Ok(table) = toml::from_str::<toml::Table>(&format!("x = {}", toml_text(&ty, &read))) else {
+            assert!(ty.is::<Twist>(), "`x = {}` is no TOML", toml_text(&ty, &read));
             continue;
         };
         let again = table["x"].clone().try_into::<Value>().unwrap_or_else(|error| panic!("{error}"));

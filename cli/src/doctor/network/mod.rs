@@ -20,9 +20,12 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     findings.extend(lan.ports.iter().map(|port| self::port(lan, port, &from)));
     findings.extend(buffers(machine));
     findings.extend(stamps(lan));
-    for peer in &lan.peers {
-        findings.push(reach(peer, lan));
-        findings.extend(mtu(peer, lan, &from));
+    // From another computer the ways to the peers are others.
+    if lan.is_here {
+        for peer in &lan.peers {
+            findings.push(reach(peer, lan));
+            findings.extend(mtu(peer, lan, &from));
+        }
     }
     findings
 }
@@ -142,7 +145,8 @@ fn reach(peer: &PeerNode, lan: &LanView) -> Finding {
 
 fn mtu(peer: &PeerNode, lan: &LanView, from: &str) -> Option<Finding> {
     let (what, why) = ("packet size", "a datagram larger than the path's MTU is lost, or refused by the kernel");
-    let way = peer.mtu?;
+    // Where nobody answers, the kernel knows of another way at most, such as that to the Internet.
+    let way = peer.mtu.filter(|_| matches!(peer.reach, Reach::NoRouter | Reach::Neighbour))?;
     Some(if way >= lan.mtu.into() {
         Finding::ok(what, format!("{} B of the {way} B that go to {}", lan.mtu, peer.name), why)
     } else {

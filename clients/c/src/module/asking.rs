@@ -42,7 +42,7 @@ pub unsafe extern "C" fn rohrpost_say(level: u8, line: *const c_char) -> Code {
         let levels = [SayLevel::Error, SayLevel::Warn, SayLevel::Info, SayLevel::Debug, SayLevel::Trace];
         let words = format_args!("`level` is {level}; it is one of rohrpost_level, 0 to 4");
         let level = levels.get(usize::from(level)).ok_or_else(|| say(Code::Value, words))?;
-        say_line(*level, line);
+        say_line(*level, line, None);
         Ok(())
     })
 }

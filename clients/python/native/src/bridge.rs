@@ -71,8 +71,11 @@ impl PythonModule {
         context: &mut NativeContext<'_>,
         part: impl FnOnce(&Bound<'_, PyAny>) -> PyResult<Py<PyAny>>,
     ) -> Result<(), ModuleError> {
-        let failed = self.call(context, |bridge| part(bridge)?.extract::<Option<String>>(bridge.py()))?;
-        failed.map_or(Ok(()), |text| Err(ModuleError::new(text)))
+        let failed = self.call(context, |bridge| {
+            let failed = part(bridge)?.into_bound(bridge.py());
+            if failed.is_none() { Ok(None) } else { told(&failed).map(Some) }
+        })?;
+        failed.map_or(Ok(()), Err)
     }
 
     fn make(&self, context: &mut NativeContext<'_>) -> Result<(), ModuleError> {
@@ -100,6 +103,12 @@ impl PythonModule {
     }
 }
 
+/// What went wrong in the author's code, in words that may have a number of the kernel's error.
+fn told(words: &Bound<'_, PyAny>) -> PyResult<ModuleError> {
+    let errno = words.getattr_opt("errno")?.map(|number| number.extract::<Option<u16>>()).transpose()?.flatten();
+    Ok(ModuleError::new(words.extract::<String>()?).with_errno(errno))
+}
+
 impl NativeModule for PythonModule {
     fn on(&mut self, context: &mut NativeContext<'_>) -> Result<(), ModuleError> {
         self.work(context, |bridge| Ok(bridge.call_method0("on")?.unbind()))
@@ -107,7 +116,8 @@ impl NativeModule for PythonModule {
 
     fn off(&mut self, context: &mut NativeContext<'_>) {
         if let Err(error) = self.work(context, |bridge| Ok(bridge.call_method0("off")?.unbind())) {
-            rohrpost_native::say(rohrpost_native::SayLevel::Error, &format!("on the way to its safe state: {error}"));
+            let text = format!("on the way to its safe state: {error}");
+            rohrpost_native::say(rohrpost_native::SayLevel::Error, &text, error.errno());
         }
     }
 
@@ -140,15 +150,16 @@ impl NativeModule for PythonModule {
         let answered = self.call(context, |bridge| {
             let arguments = PyBytes::new(bridge.py(), arguments);
             let answer = bridge.call_method1("command", (number, arguments))?;
-            answer.extract::<(Option<Vec<u8>>, bool, String)>()
+            let (result, is_refused, words) = answer.extract::<(Option<Vec<u8>>, bool, Bound<'_, PyAny>)>()?;
+            Ok((result, is_refused, told(&words)?))
         });
         match answered.map_err(CommandFailure::Module)? {
             (Some(result), ..) => {
                 reply.extend_from_slice(&result);
                 Ok(())
             }
-            (None, true, text) => Err(CommandFailure::Fault(Fault::Arguments(text))),
-            (None, false, text) => Err(CommandFailure::Module(ModuleError::new(text))),
+            (None, true, error) => Err(CommandFailure::Fault(Fault::Arguments(error.to_string()))),
+            (None, false, error) => Err(CommandFailure::Module(error)),
         }
     }
 

@@ -96,7 +96,7 @@ pub(crate) fn set_parameter(py: Python<'_>, name: &str, value: &[u8]) -> PyResul
 
 /// A line of output, from any thread; `level`: 0 error to 4 trace.
 #[pyfunction]
-pub(crate) fn say(py: Python<'_>, level: u8, text: &str) {
+pub(crate) fn say(py: Python<'_>, level: u8, text: &str, errno: Option<u16>) {
     let level = match level {
         0 => SayLevel::Error,
         1 => SayLevel::Warn,
@@ -110,5 +110,5 @@ pub(crate) fn say(py: Python<'_>, level: u8, text: &str) {
         return;
     }
     // Others may be waiting for the same queue.
-    py.detach(|| rohrpost_native::say(level, text));
+    py.detach(|| rohrpost_native::say(level, text, errno));
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -18,7 +19,7 @@ from .schema import (
 )  # fmt: skip
 from .prints import Wrong
 from .schema.errors import plain
-from .schema.tree import is_word
+from .schema.tree import Option, is_word
 
 _EPILOG = """examples:
   python -m rohrpost list --server robot.local --config robot.toml --digests COMMON-SYSTEM --as tool.64
@@ -30,6 +31,10 @@ _EPILOG = """examples:
 Arguments are numbers, words, or JSON. `rohrpost check FILE` prints the digests; a program of a system that no file
 describes writes any number as the second. With --tls FOLDER NAME, FOLDER has ca.pem, NAME.pem and NAME.key.
 """
+
+
+_BELOW_ZERO = re.compile(r"-((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan|0x[\da-f]+)$", re.IGNORECASE)
+"""Numbers that are arguments of a function and no options."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -72,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     call = add("call", _call, "calls a function of a module; without a function, lists what it offers")
     call.add_argument("what", metavar="NAME.FUNCTION", help="such as motor.0.drive; or on, off, get.DATA")
     call.add_argument("values", metavar="ARGUMENT", nargs="*", help="its arguments")
+    call._negative_number_matcher = _BELOW_ZERO
     echo = add("echo", _echo, "prints the data that a module publishes")
     echo.add_argument("what", metavar="NAME.DATA", help="such as odometry.0.odometry")
     echo.add_argument("--rate", type=float, default=0.0, metavar="HZ", help="at most so many a second; 0: all")
@@ -233,13 +239,19 @@ def _ok_type(type: Type) -> Type:
 
 def _value(field: Field, text: str) -> Any:
     try:
-        if text[:1] in ("{", "[", '"') and not is_word(field.type):
+        type = field.type if text[:1] == '"' else _some_of(field.type)
+        if text[:1] in ("{", "[", '"') and not is_word(type):
             return json.loads(text)
         return parse_argument(field.type, text)
     except WalkError as error:
         raise Wrong(str(error.within(field.name))) from None
     except (ValueError, RecursionError) as error:
         raise Wrong(f"{plain(field.name)}: no JSON: {error}") from None
+
+
+def _some_of(type: Type) -> Type:
+    """The type behind options."""
+    return _some_of(type.inner) if isinstance(type, Option) else type
 
 
 def _listing(description: Description) -> str:

@@ -10,7 +10,11 @@ from .schema.text import show_any
 
 
 class RohrpostError(Exception):
-    """What goes wrong between modules."""
+    """What goes wrong between modules. It can be pickled, so it comes out of a pool of processes as it is."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # By what it holds: most are made of something else than their words.
+        return _restored, (type(self), self.args, self.__dict__)
 
 
 class Misuse(RohrpostError):
@@ -76,6 +80,13 @@ class FunctionError(CallError):
         super().__init__(show_any(value, 8))
         self.value = value
         self.to = to
+
+
+def _restored(cls: type[RohrpostError], words: tuple[Any, ...], holds: dict[str, Any]) -> RohrpostError:
+    """One that was pickled."""
+    error = cls.__new__(cls, *words)
+    error.__dict__.update(holds)
+    return error
 
 
 def seconds(time_s: float) -> str:

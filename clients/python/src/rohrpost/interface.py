@@ -44,6 +44,11 @@ class Parameter:
                 f"{owner}.{self.name}: a parameter needs its type, such as `{self.name}: float = parameter(…)`"
             )
         type = type_of(annotation, f"{owner}.{self.name}")
+        if not tree.is_of_parameters(type):
+            raise Misuse(
+                f"{owner}.{self.name}: a parameter is bool, an integer of at most 64 bits, F32, float, str, or an enum "
+                f"of words, not {describe_type(type)}"
+            )
         least, most = (bound_of(type, it, f"{owner}.{self.name}") for it in (self._words.min, self._words.max))
         self.field = Field(self.name.replace("_", "-"), type, self._words.text, self._words.unit, least, most)
         self._range = (None if least is None else decode(type, least), None if most is None else decode(type, most))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ssl
 import sys
 import traceback
 from types import TracebackType
@@ -12,6 +13,7 @@ from ..names import Name
 from ..schema.errors import WalkError, plain
 
 _OURS = __name__.rsplit(".", 2)[0]
+_CAUSES_MAX = 16
 
 
 def call_failure(kind: str, to: int, fault: bytes, text: str, seconds: float) -> CallError:
@@ -34,11 +36,32 @@ def call_failure(kind: str, to: int, fault: bytes, text: str, seconds: float) ->
     return NotSent(text)
 
 
-def words_of(error: BaseException) -> str:
+class Words(str):
+    """What went wrong, in one line. ``errno``: number of the kernel's error behind it, if there is one."""
+
+    errno: int | None = None
+
+
+def errno_of(error: BaseException | None) -> int | None:
+    """The number of the kernel's error behind an exception: its own, or that of what it was raised from."""
+    for _ in range(_CAUSES_MAX):
+        if error is None:
+            break
+        number = error.errno if isinstance(error, OSError) else None
+        # Those of names and of TLS count in other ways.
+        if isinstance(number, int) and 0 < number < 1 << 16 and not isinstance(error, ssl.SSLError):
+            return number
+        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+    return None
+
+
+def words_of(error: BaseException) -> Words:
     """An exception in one line: its class, its text, and where the author's code raised it."""
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     place = _place(error.__traceback__)
-    return plain(f"{text} ({place})" if place else text)[:900]
+    words = Words(plain(f"{text} ({place})" if place else text)[:900])
+    words.errno = errno_of(error)
+    return words
 
 
 def _place(trace: TracebackType | None) -> str:

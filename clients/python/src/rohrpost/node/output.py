@@ -7,6 +7,7 @@ import logging
 import sys
 
 from .. import _node
+from .failures import errno_of
 
 
 class OutputHandler(logging.Handler):
@@ -15,9 +16,16 @@ class OutputHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """One line; a trace of an exception stands behind it."""
         try:
-            _node.say(_level(record.levelno), self.format(record))
+            _node.say(_level(record.levelno), self.format(record), _errno(record))
         except Exception:  # As each handler does.
             self.handleError(record)
+
+
+def _errno(record: logging.LogRecord) -> int | None:
+    """The number of the kernel's error that it tells of: of its exception, or of one among its words."""
+    words = record.args if isinstance(record.args, tuple) else ()
+    errors = [record.exc_info[1] if record.exc_info else None, *(it for it in words if isinstance(it, BaseException))]
+    return next((number for number in map(errno_of, errors) if number is not None), None)
 
 
 def _level(number: int) -> int:

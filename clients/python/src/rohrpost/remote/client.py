@@ -132,7 +132,7 @@ class Client(Shell):
                     waiting.over,
                 )  # fmt: skip
                 line = self._ears.lend(waiting) if self._core.session.is_up else None
-                is_soon = not self._pushed(now_ns) or call.repeat_ns < self._rests_until_ns
+                is_soon = not self._pushed(now_ns) or call.repeat_ns < self._rests_until_ns or self._core.has_own
             if is_soon:
                 self._wake()
             while line is not None and not call.is_done:

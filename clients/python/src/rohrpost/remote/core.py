@@ -8,6 +8,7 @@ modules, and holds one lock (or one thread) around all of it.
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -30,6 +31,7 @@ from .timing import SystemTime
 from .work import WorkQueue
 
 _HOSTED_MAX = 64
+_WAITING_MAX = 1024
 _REST_NS = 1_000_000_000
 """What fails without a connection, too, is tried again after so long."""
 _LOG = logging.getLogger(__name__)
@@ -68,6 +70,8 @@ class Core:
         self._monotonic_ns = monotonic_ns
         self._wall_ns = wall_ns
         self._endpoints: dict[Name, Endpoint] = {}
+        self._own: deque[Package] = deque()
+        """From one name of this client to another: what the TCP router would not bring back."""
         self._descriptions: dict[Name, Description] = {}
         self.words = "not connected yet"
         """What people are to know of the connection."""
@@ -87,7 +91,7 @@ class Core:
             raise Misuse(f"{name} is not of this client's system, {self.settings.installation.system}")
         if len(self._endpoints) > _HOSTED_MAX:
             raise Misuse(f"a client hosts at most {_HOSTED_MAX} modules")
-        endpoint = Endpoint(name, Caller(name, incarnation(self._wall_ns()), self.session.send))
+        endpoint = Endpoint(name, Caller(name, incarnation(self._wall_ns()), self._send))
         self._endpoints[name] = endpoint
         self._register(now_ns)
         return endpoint
@@ -98,7 +102,7 @@ class Core:
         endpoint = self.own if name == self.own.name and self.own.hosted is None else self.add(now_ns, name)
         work = WorkQueue(wake)
         own = incarnation(self._wall_ns())
-        endpoint.hosted = Hosted(name, module, now_ns, own, self.session.send, self.stamp, work, self._monotonic_ns)
+        endpoint.hosted = Hosted(name, module, now_ns, own, self._send, self.stamp, work, self._monotonic_ns)
         return endpoint
 
     def follow_inputs(self, endpoint: Endpoint, problem: Callable[[RohrpostError | None], None]) -> None:
@@ -159,19 +163,37 @@ class Core:
 
     def _polled(self, now_ns: int) -> tuple[Step, int]:
         self.now_ns = now_ns
+        self._bring(now_ns)
         due = []
         for endpoint in list(self._endpoints.values()):
             due.append(endpoint.caller.poll(now_ns))
-            if self.session.is_up:
-                due.extend(following.poll(now_ns) for following in list(endpoint.follows.values()))
+            follows = [it for it in endpoint.follows.values() if self.session.is_up or it.to in self._endpoints]
+            due.extend(following.poll(now_ns) for following in follows)
             if endpoint.hosted is not None:
                 due.append(endpoint.hosted.poll(now_ns))
         if self.session.is_up:
             due.append(self.streams.poll(now_ns, self.own.caller))
         step, until_ns = self.session.poll(now_ns)
         if step is Step.WAIT:
-            until_ns = min([until_ns, *(it for it in due if it is not None)])
+            until_ns = now_ns if self._own else min([until_ns, *(it for it in due if it is not None)])
         return step, until_ns
+
+    @property
+    def has_own(self) -> bool:
+        """Whether :meth:`poll` has packages to bring from one name of this client to another."""
+        return bool(self._own)
+
+    def _send(self, now_ns: int, package: Package) -> None:
+        """Sends it; to a name of this client with the next :meth:`poll`, with a connection or without."""
+        if Name(package.head.to).module not in self._endpoints:
+            return self.session.send(now_ns, package)
+        if len(self._own) >= _WAITING_MAX:
+            raise NotSent(f"{_WAITING_MAX} packages wait already for modules of this client; it is sent too fast")
+        self._own.append(package)
+
+    def _bring(self, now_ns: int) -> None:
+        while self._own:
+            self._deliver(now_ns, self._own.popleft())
 
     def received(self, now_ns: int, data: bytes) -> None:
         """Bytes of the stream came."""
@@ -204,7 +226,7 @@ class Core:
             envelope, _ = CallEnvelope.split(command.body)
             body = ReplyEnvelope(envelope.incarnation, envelope.sequence).to_bytes()
             body += Fault(faults.NO_MAILBOX).to_bytes()
-            self.session.send(now_ns, package(head.sender, head.to, -head.kind, head.id, body, head.priority, ERROR))
+            self._send(now_ns, package(head.sender, head.to, -head.kind, head.id, body, head.priority, ERROR))
         except (WireError, NotSent):
             return
 

@@ -86,5 +86,6 @@ class Parameters:
         if not parameter.is_in_range(value):
             shown = show(parameter.field.type, value)
             return Refusal("Range", {"name": name, "value": shown, "range": parameter.range_text})
-        new[name] = parameter, value
+        # Negative zero becomes zero, as in Rust.
+        new[name] = parameter, value + 0.0 if isinstance(value, float) else value
         return None

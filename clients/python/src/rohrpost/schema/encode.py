@@ -2,7 +2,8 @@
 
 Takes each value in the form that ``decode`` gives, and where only one thing can be meant also as JSON or a person has
 it: numbers as text (``"NaN"``, ``"0x1f"``), whole numbers that came as ``1e3``, a list of numbers for bytes, an enum by
-its name or as a dict of one entry, structs as dicts with optional fields left out, maps as lists of pairs.
+its name or as a dict of one entry, structs as dicts with optional fields left out, maps as lists of pairs, numbers and
+arrays as numpy and ``array`` have them.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 
 from .binary import varint
 from .errors import WalkError, counted, shortened
+from .foreign import plainly
 from .text import F32_MAX, expectation, rust_float, show_any
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, F32, F64, TEXT, U8, UNIT, Array, Enum, List, Map, Named, Option, Plain, Struct,
@@ -75,7 +77,8 @@ class _Encoder:
         if self.depth >= DEPTH_MAX:
             raise WalkError(f"nested more than {DEPTH_MAX} deep")
         self.depth += 1
-        self.unbounded(unwrapped(type), value)
+        type = unwrapped(type)
+        self.unbounded(type, plainly(value, type == BYTES or (isinstance(type, List) and is_byte(type.element))))
         self.depth -= 1
 
     def unbounded(self, type: Type, value: Any) -> None:

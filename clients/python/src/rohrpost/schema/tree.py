@@ -217,6 +217,13 @@ def is_empty(type: Type) -> bool:
     return type == UNIT
 
 
+def is_of_parameters(type: Type) -> bool:
+    """Whether a parameter can have this type, which a file of saved ones gives back."""
+    if isinstance(type, Plain):
+        return type in (BOOL, F32, F64, TEXT) or (type.integer is not None and type.integer[1] <= 64)
+    return isinstance(type, Enum) and type.is_words
+
+
 def is_word(type: Type) -> bool:
     """Whether one word names any value of it: a number, a bool, text, a character, a variant that carries nothing."""
     type = unwrapped(type)

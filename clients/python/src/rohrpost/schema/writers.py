@@ -12,6 +12,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+from .foreign import plainly
 from .kept import Kept
 from .tree import (
     BOOL, BYTES, CHAR, DEPTH_MAX, F32, F64, TEXT, Array, Enum, List, Map, Named, Option, Plain, Struct, Tuple, Type,
@@ -154,7 +155,9 @@ def _char(out: bytearray, value: Any) -> None:
 
 def _octets(out: bytearray, value: Any) -> None:
     if value.__class__ not in (bytes, bytearray, memoryview):
-        raise Unwritten
+        value = plainly(value, True)
+        if value.__class__ is not bytes:
+            raise Unwritten
     data = bytes(value)
     _append(out, len(data))
     out += data
@@ -192,7 +195,9 @@ def _option(inner: Writer, is_marked: bool) -> Writer:
 def _many(inner: Writer, as_float: str, fixed: int | None) -> Writer:
     def write(out: bytearray, value: Any) -> None:
         if value.__class__ is not list and value.__class__ is not tuple:
-            raise Unwritten
+            value = plainly(value, False)
+            if value.__class__ is not list:
+                raise Unwritten
         if fixed is None:
             _append(out, len(value))
         elif len(value) != fixed:
