@@ -10,7 +10,7 @@ use crate::mailbox::TRANSIT;
 use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start, TCP_CLIENT, TCP_ROUTER};
 use crate::node::{Node, Reach};
 use crate::output::LineFormat;
-use crate::saved::SavedValue;
+use crate::saved::{SavedDocument, SavedValue};
 use crate::time::TimeSource;
 use crate::units::{count_text, duration_text, size_text};
 use rohrpost_mailbox::{Name, saturating_sum};
@@ -25,7 +25,11 @@ const INDENT: usize = 16;
 /// Explains an installation, or one node of it: what runs where, how urgent it is, what its mailboxes and streams hold,
 /// what happens when a mailbox is full, and when a module ends.
 pub fn explain(installation: &Installation, node: Option<&str>) -> String {
-    let mut page = Page { installation, text: String::new() };
+    let mut page = Page {
+        installation,
+        saved: installation.saved.as_ref().map(|saved| saved.document(installation)),
+        text: String::new(),
+    };
     page.head();
     page.classes();
     for shown in installation.nodes.iter().filter(|shown| node.is_none_or(|name| name == shown.name)) {
@@ -49,6 +53,7 @@ pub fn explain(installation: &Installation, node: Option<&str>) -> String {
 
 struct Page<'i> {
     installation: &'i Installation,
+    saved: Option<SavedDocument<'i>>,
     text: String,
 }
 
@@ -248,7 +253,7 @@ impl Page<'_> {
             let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
             self.entry("settings", &settings.join(", "));
         }
-        let values = self.installation.saved.as_ref().map(|saved| saved.values(self.installation, module.name));
+        let values = self.saved.as_ref().map(|saved| saved.values(module.name));
         if let Some(Ok(values)) = values.filter(|values| values.as_ref().is_ok_and(|values| !values.is_empty())) {
             let text = |saved: &SavedValue<toml::Value>| format!("{} = {}", saved.name, saved.value);
             self.entry("saved", &values.iter().map(text).collect::<Vec<_>>().join(", "));

@@ -4,7 +4,7 @@
 
 use crate::errors::Problem;
 use crate::units;
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 use toml::Spanned;
@@ -16,17 +16,20 @@ const DURATION_MAX: Duration = Duration::from_secs(24 * 3600);
 /// The file, and its mistakes so far.
 pub(crate) struct Reader<'d> {
     text: &'d str,
+    lines: Lines,
+    /// The first bracket without a closing one, once it was looked for.
+    open: OnceCell<Option<(usize, char)>>,
     problems: RefCell<Vec<Problem>>,
 }
 
 impl<'d> Reader<'d> {
     pub(crate) fn new(text: &'d str) -> Self {
-        Self { text, problems: RefCell::default() }
+        Self { text, lines: Lines::of(text), open: OnceCell::new(), problems: RefCell::default() }
     }
 
     /// Line of a place in the text, counted from 1.
     pub(crate) fn line(&self, span: Range<usize>) -> usize {
-        line_of(self.text, span.start)
+        self.lines.line(span.start)
     }
 
     pub(crate) fn report(&self, line: usize, message: impl Into<String>) {
@@ -43,7 +46,8 @@ impl<'d> Reader<'d> {
         let span = error.span().unwrap_or(0..0);
         let there = self.text.get(span.clone()).unwrap_or_default();
         let line = self.line(span.clone());
-        let open = bracket_left_open(self.text).map(|(at, bracket)| (line_of(self.text, at), bracket));
+        let open = *self.open.get_or_init(|| bracket_left_open(self.text));
+        let open = open.map(|(at, bracket)| (self.lines.line(at), bracket));
         // The parser continues, and reports an error inside.
         if let Some((opened, bracket)) =
             open.filter(|(opened, _)| *opened <= line && error.message() != "duplicate key")
@@ -107,11 +111,21 @@ fn string_bytes(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// Line of a byte of the text, counted from 1. A place past the end is the last line with content.
-pub(crate) fn line_of(text: &str, offset: usize) -> usize {
-    let text = text.trim_end();
-    let before = &text.as_bytes()[..offset.min(text.len())];
-    1 + before.iter().filter(|byte| **byte == b'\n').count()
+/// Where the lines of a text end, found once for all its mistakes.
+pub(crate) struct Lines {
+    /// Places of the line breaks between lines with content.
+    ends: Vec<usize>,
+}
+
+impl Lines {
+    pub(crate) fn of(text: &str) -> Self {
+        Self { ends: text.trim_end().match_indices('\n').map(|(at, _)| at).collect() }
+    }
+
+    /// Line of a byte of the text, counted from 1. A place past the end is the last line with content.
+    pub(crate) fn line(&self, offset: usize) -> usize {
+        1 + self.ends.partition_point(|end| *end < offset)
+    }
 }
 
 /// A table of the file.

@@ -26,9 +26,10 @@ impl Contents {
             )
         })?;
         let mut modules = BTreeMap::new();
+        let document = saved.document(installation);
         for module in saved.modules() {
             let mut text = String::new();
-            for saved in saved.values::<toml::Value>(installation, module)? {
+            for saved in document.values::<toml::Value>(module)? {
                 let _ = writeln!(text, "{} = {}", key(&saved.name), saved.value);
             }
             modules.insert(installation.classes.format(module), text);
