@@ -51,6 +51,7 @@ mod gui;
 mod installation;
 mod keys;
 mod lan;
+mod line_ends;
 mod load;
 mod log_control;
 mod mailbox;

@@ -3,6 +3,7 @@
 //! Keys that a [`Section`] was asked for are known: [`Section::finish`] reports others. Wrong ones read as missing.
 
 use crate::errors::Problem;
+use crate::line_ends::LineEnds;
 use crate::units;
 use std::cell::{OnceCell, RefCell};
 use std::ops::{Range, RangeInclusive};
@@ -16,15 +17,15 @@ const DURATION_MAX: Duration = Duration::from_secs(24 * 3600);
 /// The file, and its mistakes so far.
 pub(crate) struct Reader<'d> {
     text: &'d str,
-    lines: Lines,
-    /// The first bracket without a closing one, once it was looked for.
+    lines: LineEnds,
+    /// The first bracket without a closing one, and its line, once it was looked for.
     open: OnceCell<Option<(usize, char)>>,
     problems: RefCell<Vec<Problem>>,
 }
 
 impl<'d> Reader<'d> {
     pub(crate) fn new(text: &'d str) -> Self {
-        Self { text, lines: Lines::of(text), open: OnceCell::new(), problems: RefCell::default() }
+        Self { text, lines: LineEnds::of(text), open: OnceCell::new(), problems: RefCell::default() }
     }
 
     /// Line of a place in the text, counted from 1.
@@ -46,11 +47,10 @@ impl<'d> Reader<'d> {
         let span = error.span().unwrap_or(0..0);
         let there = self.text.get(span.clone()).unwrap_or_default();
         let line = self.line(span.clone());
-        let open = *self.open.get_or_init(|| bracket_left_open(self.text));
-        let open = open.map(|(at, bracket)| (self.lines.line(at), bracket));
+        let open = || bracket_left_open(self.text).map(|(at, bracket)| (self.lines.line(at), bracket));
         // The parser continues, and reports an error inside.
         if let Some((opened, bracket)) =
-            open.filter(|(opened, _)| *opened <= line && error.message() != "duplicate key")
+            self.open.get_or_init(open).filter(|(opened, _)| *opened <= line && error.message() != "duplicate key")
         {
             let end = if bracket == '[' { ']' } else { '}' };
             return self.report(
@@ -109,23 +109,6 @@ fn string_bytes(text: &str, quote: char) -> usize {
         }
     }
     text.len()
-}
-
-/// Where the lines of a text end, found once for all its mistakes.
-pub(crate) struct Lines {
-    /// Places of the line breaks between lines with content.
-    ends: Vec<usize>,
-}
-
-impl Lines {
-    pub(crate) fn of(text: &str) -> Self {
-        Self { ends: text.trim_end().match_indices('\n').map(|(at, _)| at).collect() }
-    }
-
-    /// Line of a byte of the text, counted from 1. A place past the end is the last line with content.
-    pub(crate) fn line(&self, offset: usize) -> usize {
-        1 + self.ends.partition_point(|end| *end < offset)
-    }
 }
 
 /// A table of the file.

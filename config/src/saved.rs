@@ -2,8 +2,9 @@
 
 use crate::errors::{Errors, Problem, SettingsError};
 use crate::installation::Installation;
+use crate::line_ends::LineEnds;
 use crate::module::Module;
-use crate::reader::{Item, Lines, Reader, Section, nearest};
+use crate::reader::{Item, Reader, Section, nearest};
 use rohrpost_mailbox::Name;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
@@ -89,7 +90,7 @@ impl Saved {
     /// Parses the text for the places of its values.
     pub fn document<'s>(&'s self, installation: &'s Installation) -> SavedDocument<'s> {
         let table = DeTable::parse(&self.text).map(Spanned::into_inner).unwrap_or_default();
-        SavedDocument { saved: self, installation, table, lines: Lines::of(&self.text) }
+        SavedDocument { saved: self, installation, table, lines: LineEnds::of(&self.text) }
     }
 }
 
@@ -98,7 +99,7 @@ pub struct SavedDocument<'s> {
     saved: &'s Saved,
     installation: &'s Installation,
     table: DeTable<'s>,
-    lines: Lines,
+    lines: LineEnds,
 }
 
 impl<'s> SavedDocument<'s> {

@@ -2,8 +2,8 @@
 
 use crate::errors::SettingsError;
 use crate::installation::Installation;
+use crate::line_ends::LineEnds;
 use crate::module::Module;
-use crate::reader::Lines;
 use crate::saved::SavedDocument;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
@@ -14,7 +14,7 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 pub struct Document<'i> {
     installation: &'i Installation,
     table: DeTable<'i>,
-    lines: Lines,
+    lines: LineEnds,
     saved: Option<SavedDocument<'i>>,
 }
 
@@ -24,7 +24,7 @@ impl Installation {
         Document {
             installation: self,
             table: DeTable::parse(&self.text).map(Spanned::into_inner).unwrap_or_default(),
-            lines: Lines::of(&self.text),
+            lines: LineEnds::of(&self.text),
             saved: self.saved.as_ref().map(|saved| saved.document(self)),
         }
     }
