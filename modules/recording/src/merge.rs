@@ -56,7 +56,7 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
         return Err(MergeError::Nothing);
     }
     let types = check_types(paths)?;
-    let mut new = Rewriter::create(to)?;
+    let mut new = Rewriter::create(to, paths.iter().map(PathBuf::as_path))?;
     let names = paths.iter().enumerate().map(|(at, path)| (format!("{:04}", at + 1), file_name(path)));
     new.metadata(metadata::MERGED, names.collect()).map_err(RewriteError::from)?;
     let sources = paths.iter().enumerate().map(|(number, path)| Source::open(number, path, &mut new));

@@ -65,7 +65,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
         return Err(RecoverError::BeingWritten(Shown(path.to_owned())));
     }
     let mut contents = Contents::open(path)?;
-    let mut new = Rewriter::create(to)?;
+    let mut new = Rewriter::create(to, [path])?;
     let (mut damages, mut unchecked) = (Damages::default(), 0);
     while let Some(item) = contents.next()? {
         progress(contents.at(), contents.file_bytes());

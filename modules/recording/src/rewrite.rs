@@ -1,6 +1,6 @@
 //! A new file from what others have. It gets its name once it is whole.
 
-use crate::disk::{Disk, RealDisk};
+use crate::disk::{Disk, RealDisk, mode_of};
 use crate::error::{DiskError, RewriteError};
 use crate::file::OpenFile;
 use crate::format::{CHUNK_BYTES_MAX, MESSAGE_OVERHEAD_BYTES};
@@ -27,9 +27,10 @@ pub(crate) struct Rewriter {
 }
 
 impl Rewriter {
-    /// Begins one.
-    pub(crate) fn create(to: &Path) -> Result<Self, RewriteError> {
-        let (part, made) = PartFile::create(to, |path| RealDisk.create(path))?;
+    /// Begins one, of these sources.
+    pub(crate) fn create<'a>(to: &Path, sources: impl IntoIterator<Item = &'a Path>) -> Result<Self, RewriteError> {
+        let mode = mode_of(sources);
+        let (part, made) = PartFile::create(to, |path| RealDisk.create(path, mode))?;
         let file = OpenFile::begin(&mut RealDisk, part.path(), made)?;
         Ok(Self { file: Some(file), part: Some(part), channels: BTreeMap::new(), chunk_bytes: 0, messages: 0 })
     }
