@@ -138,6 +138,11 @@ impl Module for Logd {
             assert!(status.is_running, "the thread that writes has ended");
             self.health.tell(status, Instant::now());
         }
+        context.complain(match &status {
+            None => "records nothing: log control has switched it off".into(),
+            Some(Status { problem: Some(problem), .. }) => format!("records nothing: {}", problem.error),
+            Some(_) => String::new(),
+        });
         context.publish_now(RecorderInterface::STATE, &status.as_ref().map(state).unwrap_or_default())?;
         self.control.open(context, Instant::now());
         self.look_at_orders();
