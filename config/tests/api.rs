@@ -253,15 +253,15 @@ fn processor_ns() -> u64 {
 
 #[test]
 fn ten_times_as_many_lines_that_are_no_toml_take_about_ten_times_as_long() {
+    // As many in sum, and enough of them for a clock that goes by ticks.
     let times = [200, 2000].map(|count| {
         let text: String = (0..count).map(|line| format!("key-{line} = = {line}\n")).collect();
-        let once = || {
-            let before = processor_ns();
+        let before = processor_ns();
+        for _ in 0..20_000 / count {
             let errors = Installation::parse(&text, Path::new("robot.toml")).unwrap_err();
             assert!(errors.problems().len() >= count, "{}", errors.problems().len());
-            processor_ns() - before
-        };
-        (0..3).map(|_| once()).min().unwrap()
+        }
+        processor_ns() - before
     });
-    assert!(times[1] < 30 * times[0], "{times:?} ns");
+    assert!(times[1] < 3 * times[0], "{times:?} ns");
 }

@@ -82,8 +82,7 @@ impl Module for Logd {
         let node = installation.node_of(context.me());
         let node = node.ok_or_else(|| ModuleError::new("it is not in the configuration"))?.to_owned();
         let folder_mode = installation.node(&node).map_or(0o700, |node| node.mode);
-        // Those above it may be where a disk is to be mounted. Whatever is wrong with it, the writer tells as soon as it
-        // needs it.
+        // Those above it may be where a disk is to be mounted. What is wrong the writer tells as soon as it needs it.
         let _ = folder::make(&recording.directory, folder_mode);
         // Before there is a file of this run.
         leftovers::recover(&recording.directory, &node, recording.leave_free)?;

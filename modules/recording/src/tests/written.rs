@@ -3,8 +3,8 @@
 use super::support::{Said, file_of, files, memory_folder, noise, options, read, record, said};
 use crate::disk::RealDisk;
 use crate::{
-    ChannelError, ChannelSpec, DescribedModule, DrawOptions, Message, Options, Rotation, Selection, Session,
-    StartError, WriteError, Writer, cut, draw, info, merge, recover,
+    ChannelError, ChannelSpec, DescribedModule, Message, Options, Rotation, Selection, Session, StartError, WriteError,
+    Writer, cut, info, merge, recover,
 };
 use proptest::prelude::*;
 use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
@@ -63,12 +63,11 @@ fn a_file_is_for_its_user_alone_and_what_is_made_of_files_lets_in_nobody_else_th
     record(Box::new(RealDisk), for_group, &said(10, 20));
     assert_eq!(mode(&folder.path().join("group-0001.mcap")), 0o660, "whatever the umask says");
     let (group, all) = (open("a", 0o640), open("b", 0o664));
-    let made = ["cut.mcap", "merged.mcap", "recovered.mcap", "drawn.mcap"].map(|name| folder.path().join(name));
+    let made = ["cut.mcap", "merged.mcap", "recovered.mcap"].map(|name| folder.path().join(name));
     cut(&all, &made[0], &Selection::default(), &mut |_, _| {}).unwrap();
     merge(&[group.clone(), all], &made[1], &mut |_, _| {}).unwrap();
     recover(&group, &made[2], &mut |_, _| {}).unwrap();
-    draw(&group, &made[3], &Selection::default(), &DrawOptions::default(), &mut |_, _| {}).unwrap();
-    assert_eq!(made.each_ref().map(|path| mode(path)), [0o664, 0o640, 0o640, 0o640]);
+    assert_eq!(made.each_ref().map(|path| mode(path)), [0o664, 0o640, 0o640]);
 }
 
 #[test]
