@@ -66,6 +66,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         let sums: Vec<FlowSum> =
             data.iter().map(|(number, _)| sum_of(&|flow| flow.kind == Type::data(*number))).collect();
+        if sums.iter().all(|sum| sum.packages == 0) {
+            watched.running.in_error(watched.module).map_or(Ok(()), Err)?;
+        }
         let told = data.iter().zip(&sums).all(|((_, name), sum)| tell_one(arguments, &module, name, "published", sum));
         watched.renew(&mut data, wanted);
         Ok(told)

@@ -2,8 +2,9 @@
 
 use super::stream::too_large_for_data;
 use super::target::{Running, Target};
-use crate::terminal::{Failure, say, say_folded};
+use crate::terminal::{Failure, complain, say, say_folded};
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
+use rohrpost::output::plain;
 use rohrpost::schema::{DataItem, Description, decode};
 use rohrpost::{Name, ToolLink};
 use rohrpost_mailbox::{Kind, local};
@@ -60,10 +61,28 @@ fn echo(arguments: &Arguments, running: &Running, module: Name, tool: &mut ToolL
     let mailbox = local::DATA;
     let wish =
         Subscribe { number: item.number, id: 1, period_us: rate_us, lease_ms: LEASE.as_millis() as u32, mailbox };
-    let result = follow(arguments, module, &description, item, wish, tool);
+    let result = follow(arguments, running, &description, item, (module, wish), tool);
     // The module may have ended; the lease would expire anyway.
     let _ = tool.common::<()>(module, UNSUBSCRIBE, &Unsubscribe { id: wish.id, mailbox });
     result
+}
+
+/// Values that could not be decoded.
+#[derive(Default)]
+struct UnreadableValues {
+    /// Why, as it was told last.
+    told: String,
+}
+
+impl UnreadableValues {
+    /// Whether this is another reason than that of the one before.
+    fn is_news(&mut self, why: &str) -> bool {
+        let is_news = self.told != why;
+        if is_news {
+            self.told = why.into();
+        }
+        is_news
+    }
 }
 
 fn choose<'a>(description: &'a Description, name: Option<&str>) -> Result<&'a DataItem, Failure> {
@@ -80,10 +99,10 @@ fn choose<'a>(description: &'a Description, name: Option<&str>) -> Result<&'a Da
 
 fn follow(
     arguments: &Arguments,
-    module: Name,
+    running: &Running,
     description: &Description,
     item: &DataItem,
-    wish: Subscribe,
+    (module, wish): (Name, Subscribe),
     tool: &mut ToolLink,
 ) -> Result<(), Failure> {
     tool.data()?;
@@ -92,12 +111,18 @@ fn follow(
     let patience = super::units::seconds(arguments.timeout)?;
     let (mut renew_at, mut count) = (Instant::now(), 0);
     let mut last_at = Instant::now();
+    let mut unreadable = UnreadableValues::default();
     let stop = rohrpost::launch::events()?;
     loop {
         if Instant::now() >= renew_at {
             let write = |body: &mut Vec<u8>| rohrpost::wire::append(body, &wish);
             tool.call(module, SUBSCRIBE, description.hash(), write, |_| Ok(()))?;
             renew_at = Instant::now() + LEASE / 3;
+            if last_at.elapsed() >= LEASE / 3
+                && let Some(failure) = running.in_error(module)
+            {
+                return Err(failure);
+            }
         }
         if let Ok(rohrpost::launch::Event::Stop) = stop.try_recv() {
             return Ok(());
@@ -113,7 +138,17 @@ fn follow(
             continue;
         }
         last_at = Instant::now();
-        let value = decode(&item.field.ty, value)?;
+        let value = match decode(&item.field.ty, value) {
+            Ok(value) => value,
+            Err(error) => {
+                let why = error.to_string();
+                if unreadable.is_news(&why) {
+                    let (name, data) = (&arguments.name, plain::line(&item.field.name));
+                    complain(format_args!("{name} {data}: left out, as others like it will be: {}", plain::line(&why)));
+                }
+                continue;
+            }
+        };
         let line = if arguments.json {
             let stamped = serde_json::json!({
                 "time_ns": head.stamp_ns, "sequence": head.sequence, "missed": head.missed, "value": value,
@@ -127,5 +162,19 @@ fn follow(
         if !is_read || arguments.count.is_some_and(|wanted| count >= wanted) {
             return Ok(());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn why_values_are_left_out_is_told_when_it_changes() {
+        let mut values = UnreadableValues::default();
+        assert_eq!(
+            ["too many", "too many", "cut", "too many"].map(|why| values.is_news(why)),
+            [true, false, true, true]
+        );
     }
 }

@@ -40,6 +40,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let tell = |watched: &mut WatchedModule| {
         watched.renew(&mut data, wanted);
+        if data.iter().all(|(number, _)| watched.figures(*number).is_none_or(|figures| figures.packages == 0)) {
+            watched.running.in_error(watched.module).map_or(Ok(()), Err)?;
+        }
         let wide = data.iter().map(|(_, name)| plain::line(name).len()).max().unwrap_or(0);
         for (number, name) in &data {
             let figures = watched.figures(*number);

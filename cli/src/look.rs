@@ -11,6 +11,7 @@ use rohrpost::description::noted;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
 use rohrpost::launcher::{SnapshotRequest, launcher_of};
+use rohrpost::output::plain;
 use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::survey::{MailboxSnapshot, Scope, Snapshot, Standing, Survey, look_at_all};
@@ -53,6 +54,16 @@ impl Running {
             Some(seen) => seen.map_err(|silence| silence.text().into()),
             None => Err(format!("no node `{node}`").into()),
         }
+    }
+
+    /// Why nothing more comes of a module: it is in error, which only a command ends. None while it works, and where
+    /// nobody knows.
+    pub(super) fn in_error(&self, module: Name) -> Option<Failure> {
+        let survey = self.look(self.node_of(module), Scope::Module(module.raw())).ok()?;
+        let found = survey.module(module).filter(|found| found.standing() == Standing::Error)?;
+        let (name, why) = (self.text(found.name), found.last_error(&self.installation));
+        let why = if why.is_empty() { format!("`rohrpost status {name}` says why") } else { why };
+        Some(format!("{name} is in error, and nothing comes of it: {}", plain::line(&why)).into())
     }
 
     /// Observes all selected nodes, and merges them into one survey; for a silent node it lists the configured modules.

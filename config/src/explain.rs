@@ -11,7 +11,7 @@ use crate::mailbox::TRANSIT;
 use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start, TCP_CLIENT, TCP_ROUTER};
 use crate::node::{Node, Reach};
 use crate::output::LineFormat;
-use crate::saved::SavedValue;
+use crate::saved::{SavedDocument, SavedValue};
 use crate::time::TimeSource;
 use crate::units::{count_text, duration_text, size_text};
 use rohrpost_mailbox::{Name, saturating_sum};
@@ -26,7 +26,11 @@ const INDENT: usize = 16;
 /// Explains an installation, or one node of it: what runs where, how urgent it is, what its mailboxes and streams hold,
 /// what happens when a mailbox is full, and when a module ends.
 pub fn explain(installation: &Installation, node: Option<&str>) -> String {
-    let mut page = Page { installation, text: String::new() };
+    let mut page = Page {
+        installation,
+        saved: installation.saved.as_ref().map(|saved| saved.document(installation)),
+        text: String::new(),
+    };
     page.head();
     page.classes();
     for shown in installation.nodes.iter().filter(|shown| node.is_none_or(|name| name == shown.name)) {
@@ -50,6 +54,7 @@ pub fn explain(installation: &Installation, node: Option<&str>) -> String {
 
 struct Page<'i> {
     installation: &'i Installation,
+    saved: Option<SavedDocument<'i>>,
     text: String,
 }
 
@@ -255,7 +260,7 @@ impl Page<'_> {
             let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
             self.entry("settings", &settings.join(", "));
         }
-        let saved = self.installation.saved.as_ref().map(|saved| saved.texts(module.name)).unwrap_or_default();
+        let saved = self.saved.as_ref().map(|saved| saved.texts(module.name)).unwrap_or_default();
         if !saved.is_empty() {
             let text = |saved: &SavedValue<&str>| format!("{} = {}", saved.name, saved.value);
             self.entry("saved", &saved.iter().map(text).collect::<Vec<_>>().join(", "));

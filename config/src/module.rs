@@ -102,7 +102,7 @@ pub struct Module {
     pub calls: Vec<Name>,
     /// The members of [`calls`](Self::calls) that may have a less important class, and why.
     pub downwards: DownwardCalls,
-    /// Settings of its own; [`Installation::settings_as`](crate::Installation::settings_as) gives them a type.
+    /// Settings of its own; [`Document::settings_as`](crate::Document::settings_as) gives them a type.
     pub settings: toml::Table,
     /// State after launch.
     pub start: Start,

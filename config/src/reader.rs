@@ -3,8 +3,9 @@
 //! Keys that a [`Section`] was asked for are known: [`Section::finish`] reports others. Wrong ones read as missing.
 
 use crate::errors::Problem;
+use crate::line_ends::LineEnds;
 use crate::units;
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 use toml::Spanned;
@@ -16,17 +17,20 @@ const DURATION_MAX: Duration = Duration::from_secs(24 * 3600);
 /// The file, and its mistakes so far.
 pub(crate) struct Reader<'d> {
     text: &'d str,
+    lines: LineEnds,
+    /// The first bracket without a closing one, and its line, once it was looked for.
+    open: OnceCell<Option<(usize, char)>>,
     problems: RefCell<Vec<Problem>>,
 }
 
 impl<'d> Reader<'d> {
     pub(crate) fn new(text: &'d str) -> Self {
-        Self { text, problems: RefCell::default() }
+        Self { text, lines: LineEnds::of(text), open: OnceCell::new(), problems: RefCell::default() }
     }
 
     /// Line of a place in the text, counted from 1.
     pub(crate) fn line(&self, span: Range<usize>) -> usize {
-        line_of(self.text, span.start)
+        self.lines.line(span.start)
     }
 
     pub(crate) fn report(&self, line: usize, message: impl Into<String>) {
@@ -43,10 +47,10 @@ impl<'d> Reader<'d> {
         let span = error.span().unwrap_or(0..0);
         let there = self.text.get(span.clone()).unwrap_or_default();
         let line = self.line(span.clone());
-        let open = bracket_left_open(self.text).map(|(at, bracket)| (line_of(self.text, at), bracket));
+        let open = || bracket_left_open(self.text).map(|(at, bracket)| (self.lines.line(at), bracket));
         // The parser continues, and reports an error inside.
         if let Some((opened, bracket)) =
-            open.filter(|(opened, _)| *opened <= line && error.message() != "duplicate key")
+            self.open.get_or_init(open).filter(|(opened, _)| *opened <= line && error.message() != "duplicate key")
         {
             let end = if bracket == '[' { ']' } else { '}' };
             return self.report(
@@ -105,13 +109,6 @@ fn string_bytes(text: &str, quote: char) -> usize {
         }
     }
     text.len()
-}
-
-/// Line of a byte of the text, counted from 1. A place past the end is the last line with content.
-pub(crate) fn line_of(text: &str, offset: usize) -> usize {
-    let text = text.trim_end();
-    let before = &text.as_bytes()[..offset.min(text.len())];
-    1 + before.iter().filter(|byte| **byte == b'\n').count()
 }
 
 /// A table of the file.

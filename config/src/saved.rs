@@ -2,11 +2,13 @@
 
 use crate::errors::{Errors, Problem, SettingsError};
 use crate::installation::Installation;
+use crate::line_ends::LineEnds;
 use crate::module::Module;
-use crate::reader::{Item, Reader, Section, line_of, nearest};
+use crate::reader::{Item, Reader, Section, nearest};
 use rohrpost_mailbox::Name;
 use serde::de::DeserializeOwned;
 use std::borrow::Cow;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
@@ -62,8 +64,10 @@ impl Saved {
         }
         let mut modules = Vec::new();
         if syntax.is_empty() {
+            let own = installation.modules.iter().map(|module| installation.classes.format(module.name));
+            let own: Vec<String> = own.collect();
             for item in Section::new(&reader, "", 1, document.get_ref()).entries() {
-                modules.extend(owner(&item, installation).map(|name| (name, item.key.clone())));
+                modules.extend(owner(&item, installation, &own).map(|name| (name, item.key.clone())));
             }
         }
         let problems = reader.into_problems();
@@ -84,23 +88,35 @@ impl Saved {
         self.modules.iter().map(|(name, _)| *name)
     }
 
+    /// Parses the text for the places of its values.
+    pub fn document<'s>(&'s self, installation: &'s Installation) -> SavedDocument<'s> {
+        let table = DeTable::parse(&self.text).map(Spanned::into_inner).unwrap_or_default();
+        SavedDocument { saved: self, installation, table, lines: LineEnds::of(&self.text) }
+    }
+}
+
+/// A file of saved values with their places. Making it parses the text: several modules share one.
+pub struct SavedDocument<'s> {
+    saved: &'s Saved,
+    installation: &'s Installation,
+    table: DeTable<'s>,
+    lines: LineEnds,
+}
+
+impl<'s> SavedDocument<'s> {
     /// The values of a module, in the order of the file.
     ///
     /// # Errors
     /// A value that the type does not take.
-    pub fn values<T: DeserializeOwned>(
-        &self,
-        installation: &Installation,
-        module: Name,
-    ) -> Result<Vec<SavedValue<T>>, SettingsError> {
-        let Some(table) = self.table(module) else { return Ok(Vec::new()) };
+    pub fn values<T: DeserializeOwned>(&self, module: Name) -> Result<Vec<SavedValue<T>>, SettingsError> {
+        let Some((_, table)) = self.table(module) else { return Ok(Vec::new()) };
         let mut values = Vec::new();
-        for (key, value) in table.get_ref() {
-            let (line, place) = (line_of(&self.text, key.span().start), value.span());
+        for (key, value) in table {
+            let (line, place) = (self.lines.line(key.span().start), value.span());
             let read = T::deserialize(ValueDeserializer::from(value.clone()));
             let value = read.map_err(|error| {
                 let at = error.span().unwrap_or(place).start;
-                self.wrong(installation, module, at, error.message())
+                self.wrong(module, at, error.message())
             })?;
             values.push((key.span().start, SavedValue { name: key.get_ref().to_string(), line, value }));
         }
@@ -110,12 +126,12 @@ impl Saved {
 
     /// The values of a module as the file writes them, in its order.
     pub fn texts(&self, module: Name) -> Vec<SavedValue<&str>> {
-        let Some(table) = self.table(module) else { return Vec::new() };
+        let Some((_, table)) = self.table(module) else { return Vec::new() };
         let entry = |(key, value): (&Spanned<Cow<'_, str>>, &Spanned<DeValue<'_>>)| {
-            let (at, text) = (key.span().start, self.text.get(value.span()).unwrap_or_default());
-            (at, SavedValue { name: key.get_ref().to_string(), line: line_of(&self.text, at), value: text })
+            let (at, text) = (key.span().start, self.saved.text.get(value.span()).unwrap_or_default());
+            (at, SavedValue { name: key.get_ref().to_string(), line: self.lines.line(at), value: text })
         };
-        let mut texts: Vec<_> = table.get_ref().iter().map(entry).collect();
+        let mut texts: Vec<_> = table.iter().map(entry).collect();
         texts.sort_by_key(|(at, _)| *at);
         texts.into_iter().map(|(_, text)| text).collect()
     }
@@ -124,14 +140,9 @@ impl Saved {
     ///
     /// # Errors
     /// The first of them, with its line.
-    pub fn check_names(
-        &self,
-        installation: &Installation,
-        module: &Module,
-        known: &[&str],
-    ) -> Result<(), SettingsError> {
-        let Some(table) = self.table(module.name) else { return Ok(()) };
-        match table.get_ref().keys().find(|key| !known.contains(&key.get_ref().as_ref())) {
+    pub fn check_names(&self, module: &Module, known: &[&str]) -> Result<(), SettingsError> {
+        let Some((_, table)) = self.table(module.name) else { return Ok(()) };
+        match table.keys().find(|key| !known.contains(&key.get_ref().as_ref())) {
             None => Ok(()),
             Some(key) => {
                 let right = match nearest(key.get_ref(), known.iter().copied()) {
@@ -142,45 +153,46 @@ impl Saved {
                     }
                 };
                 let message = format!("`{}` is no parameter; {right}", key.get_ref());
-                Err(self.wrong(installation, module.name, key.span().start, &message))
+                Err(self.wrong(module.name, key.span().start, &message))
             }
         }
     }
 
     /// The settings of a module with its saved values in place of those of the same names, and the places of these.
-    pub(crate) fn over<'a>(&'a self, module: Name, settings: &Spanned<DeValue<'a>>) -> Option<Spanned<DeValue<'a>>> {
-        let saved = self.table(module)?;
+    pub(crate) fn over<'a>(&self, module: Name, settings: &Spanned<DeValue<'a>>) -> Option<Spanned<DeValue<'a>>>
+    where
+        's: 'a,
+    {
+        let (place, saved) = self.table(module)?;
         let mut merged = settings.get_ref().as_table().cloned().unwrap_or_default();
-        for (key, value) in saved.get_ref() {
+        for (key, value) in saved {
             // Taken out first: the key in a map keeps its own place in the other file.
             merged.remove(key);
             merged.insert(key.clone(), value.clone());
         }
-        Some(Spanned::new(saved.span(), DeValue::Table(merged)))
+        Some(Spanned::new(place, DeValue::Table(merged)))
     }
 
-    pub(crate) fn wrong(&self, installation: &Installation, module: Name, at: usize, message: &str) -> SettingsError {
+    pub(crate) fn wrong(&self, module: Name, at: usize, message: &str) -> SettingsError {
         SettingsError {
-            path: self.path.clone(),
-            line: line_of(&self.text, at),
-            module: installation.classes.format(module),
+            path: self.saved.path.clone(),
+            line: self.lines.line(at),
+            module: self.installation.classes.format(module),
             message: message.into(),
         }
     }
 
-    /// The table of a module; the text is parsed again for the places.
-    fn table(&self, module: Name) -> Option<Spanned<DeTable<'_>>> {
-        let (_, key) = self.modules.iter().find(|(name, _)| *name == module)?;
-        let document = DeTable::parse(&self.text).ok()?.into_inner();
-        let entry = document.get(key.as_str())?;
-        Some(Spanned::new(entry.span(), entry.get_ref().as_table()?.clone()))
+    /// The table of a module, and its place.
+    fn table(&self, module: Name) -> Option<(Range<usize>, &DeTable<'s>)> {
+        let (_, key) = self.saved.modules.iter().find(|(name, _)| *name == module)?;
+        let entry = self.table.get(key.as_str())?;
+        Some((entry.span(), entry.get_ref().as_table()?))
     }
 }
 
-/// The module of these values; none after an error that was reported.
-fn owner(item: &Item<'_>, installation: &Installation) -> Option<Name> {
+/// The module of these values, one of `own`; none after an error that was reported.
+fn owner(item: &Item<'_>, installation: &Installation, own: &[String]) -> Option<Name> {
     let text = item.key.as_str();
-    let own: Vec<String> = installation.modules.iter().map(|module| installation.classes.format(module.name)).collect();
     let name = installation.classes.parse_module(text).ok();
     let module = name.and_then(|name| Some((name, installation.module(name)?)));
     let right = match module {

@@ -53,8 +53,8 @@ fn every_key_arrives() {
     let image = StreamSpec { record_bytes: 8 << 20, keep: 8, ..StreamSpec::default() };
     assert_eq!(motor.streams, BTreeMap::from([("image".into(), image), ("scan".into(), scan)]));
     let line = |text: &str| 1 + FULL.lines().position(|line| line == text).unwrap();
-    assert_eq!(full.stream_line(motor, "image"), line("[module.stream.image]"));
-    assert_eq!(full.stream_line(motor, "points"), motor.line, "it has no section");
+    assert_eq!(full.document().stream_line(motor, "image"), line("[module.stream.image]"));
+    assert_eq!(full.document().stream_line(motor, "points"), motor.line, "it has no section");
 
     assert_eq!(full.flows[0].deadline, Duration::from_millis(50));
     assert_eq!(full.flows[1].deadline, full.flows[1].period, "without a deadline, the next package's time");
@@ -144,7 +144,7 @@ fn settings_become_types_or_name_their_line() {
     let settings = |text: &str| {
         let demo = parse(text);
         let name = demo.classes.parse_module("mapper.0").unwrap();
-        demo.settings_as::<MapperSettings>(demo.module(name).unwrap()).map_err(|error| error.to_string())
+        demo.document().settings_as::<MapperSettings>(demo.module(name).unwrap()).map_err(|error| error.to_string())
     };
     let right = MapperSettings { laser: "laser.0".into(), odometry: "odometry.0".into(), resolution_m: 0.05 };
     assert_eq!(settings(DEMO), Ok(right));
@@ -243,4 +243,25 @@ fn damaged_files_give_errors_and_nothing_worse() {
             }
         }
     }
+}
+
+/// Time of the processor for this thread, whatever else the computer does.
+fn processor_ns() -> u64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
+    told.split(' ').next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn ten_times_as_many_lines_that_are_no_toml_take_about_ten_times_as_long() {
+    // As many in sum, and enough of them for a clock that goes by ticks.
+    let times = [200, 2000].map(|count| {
+        let text: String = (0..count).map(|line| format!("key-{line} = = {line}\n")).collect();
+        let before = processor_ns();
+        for _ in 0..20_000 / count {
+            let errors = Installation::parse(&text, Path::new("robot.toml")).unwrap_err();
+            assert!(errors.problems().len() >= count, "{}", errors.problems().len());
+        }
+        processor_ns() - before
+    });
+    assert!(times[1] < 3 * times[0], "{times:?} ns");
 }

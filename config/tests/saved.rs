@@ -31,7 +31,7 @@ fn with(text: &str) -> Installation {
 
 fn pilot(installation: &Installation) -> Result<Pilot, String> {
     let name = installation.classes.parse_module("pilot.0").unwrap();
-    installation.settings_as(installation.module(name).unwrap()).map_err(|error| error.to_string())
+    installation.document().settings_as(installation.module(name).unwrap()).map_err(|error| error.to_string())
 }
 
 #[test]
@@ -92,10 +92,11 @@ fn mistakes_in_the_file_are_told_by_line() {
 #[test]
 fn values_of_what_is_no_parameter_are_refused() {
     let installation = with("[\"pilot.0\"]\ncruise-m-s = 0.4\nlaser = \"laser.0\"\n");
-    let saved = installation.saved.as_ref().unwrap();
+    let document = installation.document();
+    let saved = document.saved().unwrap();
     let name = installation.classes.parse_module("pilot.0").unwrap();
     let module = installation.module(name).unwrap();
-    let check = |known: &[&str]| saved.check_names(&installation, module, known).map_err(|error| error.to_string());
+    let check = |known: &[&str]| saved.check_names(module, known).map_err(|error| error.to_string());
     assert_eq!(check(&["cruise-m-s", "laser"]), Ok(()));
     for (known, says) in [
         (
@@ -108,7 +109,7 @@ fn values_of_what_is_no_parameter_are_refused() {
         let said = check(known).unwrap_err();
         assert!(said.contains(says), "{said}\n  should say: {says}");
     }
-    let values: Vec<SavedValue<toml::Value>> = saved.values(&installation, name).unwrap();
+    let values: Vec<SavedValue<toml::Value>> = saved.values(name).unwrap();
     let told: Vec<_> = values.iter().map(|saved| (saved.name.as_str(), saved.line, saved.value.to_string())).collect();
     assert_eq!(told, [("cruise-m-s", 2, "0.4".into()), ("laser", 3, "\"laser.0\"".into())]);
 }

@@ -61,6 +61,16 @@ pub enum DrawError {
         /// What is wrong with it.
         cause: String,
     },
+    /// What came is more than is decoded, and may be right all the same.
+    #[error("{data} of {module} is more than is decoded: {cause}")]
+    TooMuch {
+        /// The sending module.
+        module: String,
+        /// Which of its data.
+        data: String,
+        /// What there is too much of.
+        cause: String,
+    },
 }
 
 impl DrawError {

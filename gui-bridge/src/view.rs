@@ -109,9 +109,15 @@ impl Datum<'_> {
     /// The value, by its description alone.
     ///
     /// # Errors
-    /// When the sender does not keep to its description.
+    /// When the sender does not keep to its description, or sends more than is decoded.
     pub fn value(&self) -> Result<Value, DrawError> {
-        decode(&self.item.field.ty, self.bytes).map_err(|error| self.unreadable(&error))
+        decode(&self.item.field.ty, self.bytes).map_err(|error| {
+            if error.problem.is_limit() {
+                let (module, data) = (self.module.into(), self.item.field.name.clone());
+                return DrawError::TooMuch { module, data, cause: error.to_string() };
+            }
+            self.unreadable(&error)
+        })
     }
 
     fn unreadable(&self, cause: &dyn std::fmt::Display) -> DrawError {

@@ -8,6 +8,7 @@
 
 use crate::layout::PAGE;
 use crate::step::step;
+use nix::errno::Errno;
 use nix::fcntl::{OFlag, openat, renameat};
 use nix::sys::stat::Mode;
 use nix::unistd::{UnlinkatFlags, getuid, unlinkat};
@@ -31,6 +32,9 @@ pub(crate) enum Unfit {
     /// Of a user that has nothing to say here: its path and that user.
     #[error("{0} belongs to user {1}, which may not write there; remove it")]
     Foreign(PathBuf, u32),
+    /// A directory that is to go, and has files: they may be somebody's.
+    #[error("it is a directory with files in it; see what they are, and remove it: rm -r {0}")]
+    Full(PathBuf),
 }
 
 impl Unfit {
@@ -39,9 +43,24 @@ impl Unfit {
         error.get_ref()?.downcast_ref()
     }
 
-    /// Whether what stands there is no file at all, and nobody's loss.
+    /// What stands there, if it is no file at all, and nobody's loss.
+    pub(crate) fn kind(error: &io::Error) -> Option<&'static str> {
+        if let Some(Self::Kind(kind)) = Self::of(error) { Some(kind) } else { None }
+    }
+
+    /// Whether it is no file at all.
     pub(crate) fn is_kind(error: &io::Error) -> bool {
-        matches!(Self::of(error), Some(Self::Kind(_)))
+        Self::kind(error).is_some()
+    }
+
+    /// What the system says of what is no file, as what it is.
+    fn told(error: io::Error) -> io::Error {
+        match error.raw_os_error() {
+            Some(libc::ELOOP) => Self::Kind("a link").into(),
+            Some(libc::EISDIR) => Self::Kind("a directory").into(),
+            Some(libc::ENXIO) => Self::Kind("a socket or a device").into(),
+            _ => error,
+        }
     }
 }
 
@@ -140,12 +159,24 @@ impl Directory {
 
     /// Gives a file its name, in place of what has it.
     pub(crate) fn rename(&self, temporary: &str, name: &str) -> io::Result<()> {
-        Ok(renameat(self, temporary, self, name)?)
+        match renameat(self, temporary, self, name) {
+            Err(Errno::EISDIR) => {
+                self.remove(name)?;
+                Ok(renameat(self, temporary, self, name)?)
+            }
+            renamed => Ok(renamed?),
+        }
     }
 
-    /// Takes a file's name away.
+    /// Takes the name of a file away, or of an empty directory that somebody has put in its place.
     pub(crate) fn remove(&self, name: &str) -> io::Result<()> {
-        Ok(unlinkat(self, name, UnlinkatFlags::NoRemoveDir)?)
+        match unlinkat(self, name, UnlinkatFlags::NoRemoveDir) {
+            Err(Errno::EISDIR) => match unlinkat(self, name, UnlinkatFlags::RemoveDir) {
+                Err(Errno::ENOTEMPTY | Errno::EEXIST) => Err(Unfit::Full(self.path.join(name)).into()),
+                removed => Ok(removed?),
+            },
+            removed => Ok(removed?),
+        }
     }
 
     /// Writes a file that appears whole, in place of what has its name. Two that write at once need two temporary
@@ -186,7 +217,7 @@ impl Directory {
     }
 
     fn open_checked(&self, name: &str, access: OFlag) -> io::Result<File> {
-        let file = self.open_at(name, access)?;
+        let file = self.open_at(name, access).map_err(Unfit::told)?;
         let there = file.metadata()?;
         if !there.is_file() {
             let kind = there.file_type();

@@ -24,6 +24,16 @@ pub enum BadFile {
     /// Foreign, or damaged; what it should be.
     #[error("its file is no {0}, or damaged; end its owner, and remove the file with `rohrpost clean`")]
     Foreign(&'static str),
+    /// No file at all stands in its place: a link, say.
+    #[error(
+        "{kind} stands where the file of the {what} belongs; end what uses the node, and remove it: `rohrpost clean`"
+    )]
+    NoFile {
+        /// What it should be.
+        what: &'static str,
+        /// What it is.
+        kind: &'static str,
+    },
     /// Another version's layout.
     #[error("it was made by another version (layout {0}, this program {VERSION}); build both from the same version")]
     Version(u32),
@@ -57,7 +67,7 @@ pub(crate) enum BadSegment {
 impl BadSegment {
     /// What opening the file said; what it should be.
     pub(crate) fn of_open(what: &'static str, error: io::Error) -> Self {
-        if Unfit::is_kind(&error) { BadFile::Foreign(what).into() } else { error.into() }
+        Unfit::kind(&error).map_or_else(|| error.into(), |kind| BadFile::NoFile { what, kind }.into())
     }
 }
 

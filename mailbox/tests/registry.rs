@@ -234,8 +234,14 @@ fn odd_things_in_the_directory_stop_nothing() {
     assert!(ground.node().look_at(OTHER).is_none(), "does not wait for a writer");
     assert!(matches!(me.sender(OTHER), Err(SendError::Bad(OTHER, _))));
     std::os::unix::fs::symlink("/etc/passwd", file_of(&ground, MAILBOX)).unwrap();
-    assert!(me.receiver(MAILBOX, shape(4)).is_err(), "never through a link");
-    assert!(ground.node().look_at(MAILBOX).is_none());
+    let error = me.sender(MAILBOX).err().unwrap();
+    assert!(error.to_string().contains("a link stands where the file of the mailbox belongs"), "{error}");
+    assert!(ground.node().look_at(MAILBOX).is_none(), "never through a link");
+    let before = fs::read("/etc/passwd").unwrap();
+    let receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    assert!(fs::symlink_metadata(file_of(&ground, MAILBOX)).unwrap().is_file(), "the link itself gives way");
+    assert_eq!(fs::read("/etc/passwd").unwrap(), before);
+    receiver.close();
     drop(me);
     assert!(ground.node().remove_if_dead().unwrap());
 }

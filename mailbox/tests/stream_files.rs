@@ -269,7 +269,7 @@ fn odd_things_in_a_streams_place_stop_nobody() {
         assert_eq!(unsafe { libc::mkfifo(path.as_ptr(), 0o600) }, 0);
     };
     for (what, put) in [
-        ("a pipe", &pipe as &dyn Fn(&Path)),
+        ("a named pipe", &pipe as &dyn Fn(&Path)),
         ("a directory", &|at: &Path| fs::create_dir(at).unwrap()),
         ("a link", &|at: &Path| std::os::unix::fs::symlink("/etc/passwd", at).unwrap()),
     ] {
@@ -277,22 +277,25 @@ fn odd_things_in_a_streams_place_stop_nobody() {
         let (node, me) = (ground.node(), ground.join());
         put(&file_of(&ground, ID));
         for error in [me.stream_reader(ID).err().unwrap(), node.inspect_stream(ID).err().unwrap()] {
-            match (what, &error) {
-                ("a pipe", StreamError::Bad(ID, BadFile::Foreign("stream"))) => {}
-                ("a directory" | "a link", StreamError::File(ID, path, _)) => assert_eq!(*path, file_of(&ground, ID)),
-                _ => panic!("{what}: {error}"),
-            }
+            let said = format!(
+                "stream {ID}: {what} stands where the file of the stream belongs; end what uses the node, and remove \
+                 it: `rohrpost clean`"
+            );
+            assert_eq!(error.to_string(), said);
         }
-        match me.stream_writer(ID, SMALL) {
-            Ok(mut writer) => {
-                assert_eq!(what, "a pipe");
-                write(&mut writer, 1);
-            }
-            Err(StreamError::File(ID, path, error)) => {
-                assert_eq!(path, file_of(&ground, ID));
-                assert!(matches!(error.raw_os_error(), Some(libc::EISDIR | libc::ELOOP)), "{what}: {error}");
-            }
-            Err(error) => panic!("{what}: {error}"),
+        // It goes itself, and what a link leads to stays.
+        assert!(node.remove_orphan_stream(ID).unwrap() && Path::new("/etc/passwd").exists(), "{what}");
+        put(&file_of(&ground, ID));
+        write(&mut me.stream_writer(ID, SMALL).unwrap(), 1);
+        put(&file_of(&ground, OTHER));
+        if what == "a directory" {
+            let inside = file_of(&ground, OTHER).join("of a user");
+            fs::write(&inside, "kept").unwrap();
+            let said = format!("remove it: rm -r {}", file_of(&ground, OTHER).display());
+            let error = node.remove_orphan_stream(OTHER).unwrap_err().to_string();
+            assert!(error.ends_with(&said), "{error}");
+            assert!(me.stream_writer(OTHER, SMALL).is_err() && inside.exists());
+            fs::remove_file(inside).unwrap();
         }
         me.stream_writer(OTHER, SMALL).unwrap();
         drop(me);

@@ -65,10 +65,10 @@ fn exact(place: &Place, file: &Path, words: &[&str]) -> Said {
 }
 
 /// Exact replay by this test program, whatever the recording names.
-fn exact_by_own(place: &Place, file: &Path) -> Said {
+fn exact_by_own(place: &Place, file: &Path, before: &[&str]) -> Said {
     let me = std::env::current_exe().unwrap();
     let words = ["--", "--exact", "seer::module", "--nocapture", "--test-threads", "2"];
-    exact(place, file, &[&["--program", me.to_str().unwrap()], &words[..]].concat())
+    exact(place, file, &[before, &["--program", me.to_str().unwrap()], &words[..]].concat())
 }
 
 #[test]
@@ -101,15 +101,21 @@ fn a_recorded_command_is_shown_and_runs_when_the_user_says_so() {
     let other = other.to_str().unwrap();
     let said = exact(&place, &file, &["--config", other]);
     assert!(said.out.contains(&format!("{other} has another command: /bin/true -c ")), "{said:?}");
-    assert!(said.out.contains(&format!("{other} has other settings: source")), "{said:?}");
+    assert!(
+        said.out.contains(&format!("{other} has other settings: source = \"map\" (recorded: \"clock\")")),
+        "{said:?}"
+    );
     let said = exact(&place, &file, &["--json"]);
     let run: serde_json::Value = serde_json::from_str(&said.out).unwrap();
     assert_eq!((said.code, &run["result"], &run["command"][0]), (Some(1), &"not run".into(), &"/bin/sh".into()));
     assert_eq!(run["command"][4], HOSTILE, "{run:#}");
     assert!(!ran.exists(), "nobody has said that it may run");
 
-    let text = exact_by_own(&place, &file).ok();
+    let text = exact_by_own(&place, &file, &[]).ok();
     assert!(text.starts_with("seer.0: identical: ") && !ran.exists(), "no word of the recording runs: {text}");
+    let said = exact_by_own(&place, &file, &["--config", other]);
+    let note = format!("seer.0: {other} has other settings: source = \"map\" (recorded: \"clock\")");
+    assert!(said.out.starts_with("seer.0: identical: ") && said.err.contains(&note), "{said:?}");
     let text = exact(&place, &file, &["--run-recorded"]).ok();
     assert!(text.starts_with("seer.0: identical: ") && ran.exists(), "{text}");
 }
@@ -130,7 +136,7 @@ fn what_a_journal_names_that_contradicts_its_recording_is_not_run() {
     }
     assert_eq!(exact(&place, &other, &["--run-recorded"]).code, Some(1));
     // The user's own program repeats it: a configuration may be edited before a module is restarted.
-    let own = exact_by_own(&place, &other).ok();
+    let own = exact_by_own(&place, &other, &[]).ok();
     assert!(own.starts_with("seer.0: identical: ") && !place.path("ran").exists(), "{own}");
     exact(&place, &other, &["--list"]).ok();
     std::fs::remove_file(&other).unwrap();

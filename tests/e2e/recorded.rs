@@ -305,6 +305,18 @@ fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
     let told = wait("an error", || Some(errors()).filter(|lines| lines.contains("records nothing: ")));
     assert!(told.contains("/disk/recordings") && told.contains(": is gone; make the folder again"), "{told}");
     assert!(told.contains("tries again every second (errno 2: No such file or directory)"), "{told}");
+    let shown = |tool: &str| {
+        let all = place.say(&[tool, "--json"]).json();
+        let lines = all.as_array().or_else(|| all["modules"].as_array()).unwrap();
+        let line = lines.iter().find(|line| line["module"] == "logd.0").unwrap();
+        (line["state"].as_str().unwrap().to_owned(), line["error"].as_str().unwrap_or_default().to_owned())
+    };
+    for tool in ["status", "list"] {
+        wait(format!("{tool} says that nothing is recorded"), || {
+            let (state, error) = shown(tool);
+            (state == "on" && error.starts_with("records nothing: ") && error.contains("is gone")).then_some(())
+        });
+    }
     let frames = StreamId { name: robot.name("feeder.0"), number: FeedingInterface::FRAME.number };
     wait("the recorder has subscribed", || {
         let status = place.say(&["status", "feeder.0", "--json"]).json();
@@ -321,6 +333,9 @@ fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
         wait_for_all(&place, &file, topic, 100, 1);
     }
     wait("a line", || lines(&file).iter().any(|line| line.starts_with("records again; ")).then_some(()));
+    for tool in ["status", "list"] {
+        wait(format!("{tool} says that all is well"), || (shown(tool) == ("on".into(), String::new())).then_some(()));
+    }
     drop(robot);
     launch.stop();
     for topic in ["feeder.0/count", "feeder.0/frame"] {

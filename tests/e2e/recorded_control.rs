@@ -107,6 +107,10 @@ fn the_recorder_obeys_the_command_line() {
     let ended = record(&["off"]).ok();
     assert!(ended.contains(" lost=0 files="), "{ended}");
     assert!(record(&["status"]).ok().starts_with("recording=off"));
+    wait("status says that nothing is recorded", || {
+        let said = place.say(&["status", "logd.0", "--json"]).json();
+        (said[0]["error"] == "records nothing: log control has switched it off").then_some(())
+    });
     for words in [&["mark", "late"][..], &["rotate"]] {
         assert!(record(words).fails().contains("nothing is recorded; say `on` first"));
     }

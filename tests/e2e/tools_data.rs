@@ -3,7 +3,9 @@
 use crate::harness::{OUTPUT, Place, probe, signal, wait};
 use crate::output::{call, is_own};
 use crate::process::Running;
+use crate::recorded::{RECORD, launched};
 use nix::sys::signal::Signal;
+use std::os::unix::fs::FileExt;
 use std::time::Instant;
 
 fn lines(text: &str) -> Vec<serde_json::Value> {
@@ -144,4 +146,33 @@ fn status_shows_each_module() {
     let text = place.say(&["status"]).ok();
     assert!(text.starts_with("module ") && text.lines().count() == 3, "{text}");
     echo.stop();
+}
+
+#[test]
+fn what_waits_for_a_module_in_error_says_why_and_ends() {
+    let place = Place::new();
+    let (launch, robot) = launched(&place, RECORD);
+    // Its stream `frame` has the number 2.
+    let ring = robot.node.path().join(format!("{:08x}.2.ring", robot.name("feeder.0").raw()));
+    wait("the writer finds the damage", || {
+        let ring = std::fs::File::options().write(true).open(&ring).unwrap();
+        // All but what it was made as.
+        ring.write_all_at(&vec![0xff; ring.metadata().unwrap().len() as usize - 4096], 4096).unwrap();
+        place.say(&["call", "feeder.0", "feed", "100"]);
+        (robot.state("feeder.0") == "error").then_some(())
+    });
+    for words in [
+        &["echo", "feeder.0", "count"][..],
+        &["hz", "feeder.0", "--window", "1"],
+        &["bw", "feeder.0", "count", "--window", "1"],
+        &["stream", "read", "feeder.0", "frame", "--next", "1000000"],
+    ] {
+        let said = place.say(words);
+        let why = "feeder.0 is in error, and nothing comes of it: ";
+        assert!(said.code == Some(1) && said.err.contains(why), "{words:?}: {said:?}");
+        assert!(said.err.contains("stream `frame` of feeder.0 is damaged"), "{words:?}: {said:?}");
+    }
+    drop(robot);
+    launch.signal(Signal::SIGINT);
+    assert_eq!(launch.said().code, Some(1), "a module is in error");
 }

@@ -30,7 +30,7 @@ fn less(installation: &Installation, node: &str) -> String {
     let streams = installation.modules_on(node).flat_map(|module| module.streams.iter().map(move |it| (module, it)));
     let largest = streams.max_by_key(|(_, (_, spec))| spec.memory());
     largest.map_or_else(String::new, |(module, (name, spec)): (&Module, (&String, &StreamSpec))| {
-        let (line, memory) = (installation.stream_line(module, name), size(spec.memory()));
+        let (line, memory) = (installation.document().stream_line(module, name), size(spec.memory()));
         let module = installation.classes.format(module.name);
         format!(
             "; of its streams `{name}` of {module} is the largest, {memory} (line {line}): `record` or `keep` is too \

@@ -5,6 +5,7 @@ use rohrpost_config::{Installation, RECORDED_BYTES_MAX};
 
 /// Notes on recorded streams with larger records than a recording takes.
 pub(super) fn too_large(installation: &Installation) -> Vec<String> {
+    let document = installation.document();
     let streams = installation.modules.iter().flat_map(|module| module.streams.iter().map(move |it| (module, it)));
     let larger = streams.filter(|(_, (_, spec))| spec.record_bytes as usize > RECORDED_BYTES_MAX);
     let notes = larger.filter_map(|(module, (name, spec))| {
@@ -15,7 +16,7 @@ pub(super) fn too_large(installation: &Installation) -> Vec<String> {
              counts larger ones as lost; lower `record`, or write the value in parts",
             installation.classes.format(module.name),
             size(spec.record_bytes.into()),
-            installation.stream_line(module, name),
+            document.stream_line(module, name),
             size(RECORDED_BYTES_MAX as u64)
         ))
     });

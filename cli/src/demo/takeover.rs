@@ -131,7 +131,12 @@ impl TakeoverRecord {
     /// Whether each dead router came back, and was killed if requested.
     pub(super) fn is_well(&self) -> bool {
         self.in_vain == 0
+            && self.all_are_watched()
             && self.incarnations.deaths.iter().chain(&self.beyond.deaths).all(|death| death.again.is_some())
+    }
+
+    fn all_are_watched(&self) -> bool {
+        self.incarnations.refused().chain(self.beyond.refused()).next().is_none()
     }
 
     /// Whether the TCP router had more than one incarnation.
@@ -145,7 +150,13 @@ impl TakeoverRecord {
         for death in &self.beyond.deaths {
             text += &format!("The TCP router {}.\n", self.death_text(death));
         }
-        if self.in_vain > 0 {
+        for (node, why) in self.incarnations.refused().chain(self.beyond.refused()) {
+            text += &format!(
+                "A router of node {} is not watched, or was not killed: {why}.\n",
+                self.installation.nodes[node].name
+            );
+        }
+        if self.in_vain > 0 && self.all_are_watched() {
             text += "no router was killed, as there was none: no master, if [time] of the configuration is without \
                 `source = \"master\"`, or no TCP router\n";
         }

@@ -40,7 +40,7 @@ pub(super) struct ExactArguments {
     pub(super) modules: Vec<String>,
     /// What runs; none: nothing, and what the recording would run is shown.
     pub(super) program: Option<ExactProgram>,
-    /// The user's own configuration, with which recorded commands are compared as they are shown.
+    /// The user's own configuration, with which recorded commands, settings and saved parameters are compared.
     pub(super) config: Option<PathBuf>,
     /// Where relative paths of the configuration start; none: where they did.
     pub(super) folder: Option<PathBuf>,
@@ -64,6 +64,19 @@ pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
         complain(advice(arguments));
         return Ok(ExitCode::FAILURE);
     };
+    let local = LocalConfiguration::load(arguments.config.as_deref())?;
+    let mut told: Vec<String> = Vec::new();
+    for run in &runs {
+        let exact = ExactRun { folder: folder.clone(), ..run.exact() };
+        // What cannot be read is told when it is to run.
+        let notes = local.given(run, &exact).unwrap_or_default();
+        for note in notes.iter().map(|note| format!("{}: {}", plain::line(&run.module), plain::line(note))) {
+            if !told.contains(&note) {
+                complain(&note);
+                told.push(note);
+            }
+        }
+    }
     let records = records::collect(&arguments.file, &runs, own.path(), &mut quota)?;
     let records = records.map(|path| path.display().to_string());
     let programs = ExactPrograms { program, folder, records };

@@ -1,7 +1,9 @@
 //! Folders that log control may name: those below the configured one, wherever links lead.
 
 use super::leftovers::FOLDERS_DEEP;
+use std::fs::{DirBuilder, Permissions};
 use std::io;
+use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -23,10 +25,18 @@ pub(super) enum FolderError {
     NoFolder(PathBuf),
 }
 
-/// The folder of this name below `root`, without links. It is made if the one above it exists.
+/// Makes a folder with these permissions, whatever the umask says, and none above it.
+pub(super) fn make(folder: &Path, mode: u32) -> io::Result<()> {
+    DirBuilder::new().mode(mode).create(folder)?;
+    // A disk without permissions gives each folder the same.
+    let _ = std::fs::set_permissions(folder, Permissions::from_mode(mode));
+    Ok(())
+}
+
+/// The folder of this name below `root`, without links. It is made, with these permissions, if the one above it exists.
 ///
 /// What is put in its place later, is checked with each file (`Options::root`).
-pub(super) fn below(root: &Path, name: &str) -> Result<PathBuf, FolderError> {
+pub(super) fn below(root: &Path, name: &str, mode: u32) -> Result<PathBuf, FolderError> {
     let failed = |path: &Path| {
         let path = path.to_owned();
         move |error| FolderError::Io(path, error)
@@ -45,7 +55,7 @@ pub(super) fn below(root: &Path, name: &str) -> Result<PathBuf, FolderError> {
             };
             // The one above is inside, before anything is made; then a new folder is, too.
             let made = inside(inside(above.canonicalize().map_err(failed(above))?)?.join(name))?;
-            std::fs::create_dir(&made).map_err(failed(&made))?;
+            make(&made, mode).map_err(failed(&made))?;
             made
         }
         found => found.map_err(failed(&wanted))?,
@@ -58,6 +68,15 @@ pub(super) fn below(root: &Path, name: &str) -> Result<PathBuf, FolderError> {
 mod tests {
     use super::*;
     use std::os::unix::fs::symlink;
+
+    #[test]
+    fn a_folder_has_the_permissions_of_its_node_whatever_the_umask_says() {
+        let place = tempfile::tempdir().unwrap();
+        for mode in [0o700, 0o770, 0o777] {
+            let made = below(place.path(), &format!("{mode:o}"), mode).unwrap();
+            assert_eq!(made.metadata().unwrap().permissions().mode() & 0o777, mode);
+        }
+    }
 
     #[test]
     fn folders_below_the_root_are_taken_and_no_others() {
@@ -98,11 +117,11 @@ mod tests {
             ("nul\0", None),
         ] {
             // Through a link to the root, as a configuration may name it.
-            let found = below(&place.join("link"), name);
+            let found = below(&place.join("link"), name, 0o700);
             assert_eq!(found.as_deref().ok(), wanted.map(|wanted| root.join(wanted)).as_deref(), "{name}: {found:?}");
         }
         assert_eq!(std::fs::read_dir(&away).unwrap().count(), 0, "nothing is made outside");
         assert!(!place.join("fresh").exists());
-        assert!(below(&place.join("gone"), "there").is_err());
+        assert!(below(&place.join("gone"), "there", 0o700).is_err());
     }
 }

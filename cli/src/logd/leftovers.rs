@@ -163,7 +163,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let root = place.path().canonicalize().unwrap();
         let mut name = PathBuf::new();
-        let led = |name: &Path| below(&root, name.to_str().unwrap());
+        let led = |name: &Path| below(&root, name.to_str().unwrap(), 0o700);
         for _ in 0..FOLDERS_DEEP {
             name.push("deeper");
             std::fs::write(led(&name).unwrap().join("base-0001.mcap"), "").unwrap();

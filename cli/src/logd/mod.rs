@@ -64,6 +64,8 @@ struct Logd {
     health: Health,
     /// Log control leads to folders below it.
     root: PathBuf,
+    /// Permissions of those that it makes: the node's.
+    folder_mode: u32,
     clock: ModuleClock,
     orders: Orders,
     control: ControlServer,
@@ -79,10 +81,12 @@ impl Module for Logd {
         let recording = recording.ok_or_else(|| ModuleError::new("the configuration has no [record]"))?;
         let node = installation.node_of(context.me());
         let node = node.ok_or_else(|| ModuleError::new("it is not in the configuration"))?.to_owned();
-        make(&recording.directory);
+        let folder_mode = installation.node(&node).map_or(0o700, |node| node.mode);
+        // Those above it may be where a disk is to be mounted. What is wrong the writer tells as soon as it needs it.
+        let _ = folder::make(&recording.directory, folder_mode);
         // Before there is a file of this run.
         leftovers::recover(&recording.directory, &node, recording.leave_free)?;
-        let options = options(recording, installation, &node);
+        let options = Options { mode: folder_mode & 0o666, ..options(recording, installation, &node) };
         let session = session(installation, &node);
         let earlier = EarlierFiles::find(&recording.directory, &node);
         let taps = Taps::new(installation, recording.clone(), (context.me(), &node), earlier);
@@ -103,6 +107,7 @@ impl Module for Logd {
             earlier: None,
             health: Health::default(),
             root,
+            folder_mode,
             clock: context.clock().clone(),
             orders: Orders::default(),
             control,
@@ -132,6 +137,11 @@ impl Module for Logd {
             assert!(status.is_running, "the thread that writes has ended");
             self.health.tell(status, Instant::now());
         }
+        context.complain(match &status {
+            None => "records nothing: log control has switched it off".into(),
+            Some(Status { problem: Some(problem), .. }) => format!("records nothing: {}", problem.error),
+            Some(_) => String::new(),
+        });
         context.publish_now(RecorderInterface::STATE, &status.as_ref().map(state).unwrap_or_default())?;
         self.control.open(context, Instant::now());
         self.look_at_orders();
@@ -239,12 +249,6 @@ impl Recorder for Logd {
 /// Whether there is a time at which something can arrive: that of a log begins with its player.
 fn has_begun(clock: &ModuleClock) -> bool {
     clock.record().is_none_or(|record| record.source != TimeSource::Log || record.is_known())
-}
-
-/// Makes the folder itself, and none above it: those may be where a disk is to be mounted.
-fn make(directory: &Path) {
-    // Whatever is wrong with it, the writer tells as soon as it needs it.
-    let _ = std::fs::create_dir(directory);
 }
 
 fn options(recording: &Recording, installation: &Installation, node: &str) -> Options {

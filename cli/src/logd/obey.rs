@@ -75,7 +75,7 @@ impl Logd {
     }
 
     fn go_to(&mut self, path: &str) -> Result<OpenOrder, ControlAnswer> {
-        let folder = below(&self.root, path).map_err(|error| ControlAnswer::err(&error))?;
+        let folder = below(&self.root, path, self.folder_mode).map_err(|error| ControlAnswer::err(&error))?;
         let Some(writer) = &mut self.writer else {
             let answer = with_path(ControlAnswer::ok(), "directory", &folder);
             self.options.folder = folder;

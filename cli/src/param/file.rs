@@ -27,9 +27,10 @@ impl Contents {
             )
         })?;
         let mut modules = BTreeMap::new();
+        let document = saved.document(installation);
         for module in saved.modules() {
             let mut text = String::new();
-            for saved in saved.texts(module) {
+            for saved in document.texts(module) {
                 let _ = writeln!(text, "{} = {}", toml_key(&saved.name), saved.value);
             }
             modules.insert(installation.classes.format(module), text);

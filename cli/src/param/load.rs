@@ -48,7 +48,7 @@ pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> 
 
 /// Sets the file's values for one module, all or none; one line for each parameter.
 fn load(session: &mut Session, saved: &Saved, module: Name, dry_run: bool) -> Result<Vec<String>, Failure> {
-    let values = saved.values::<Value>(&session.running.installation, module)?;
+    let values = saved.document(&session.running.installation).values::<Value>(module)?;
     let parameters = session.parameters(module)?;
     let name = session.running.text(module);
     let mut wanted = Vec::with_capacity(values.len());

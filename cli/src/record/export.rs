@@ -1,11 +1,11 @@
 //! `record export`: a recording for programs of others.
 
-use super::jsonl::JsonLines;
+use super::jsonl::{JsonLines, JsonMessage};
 use super::part::PartArguments;
 use super::progress::ProgressLine;
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, complain, say};
 use crate::units::size;
-use rohrpost::output::plain::ForeignText;
+use rohrpost::output::plain::{self, ForeignText};
 use rohrpost_recording::{DrawOptions, Drawn, Info, Reader, Selection};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -111,16 +111,32 @@ fn write_json(file: &Path, to: &Path, selection: &Selection) -> Result<ExitCode,
     let mut reader = Reader::select(file, selection)?;
     let mut lines = JsonLines::create(to)?;
     let mut line = ProgressLine::new();
+    let mut unreadable: Option<(u64, String)> = None;
     loop {
         let (read, all) = reader.progress();
         line.tell(read, all);
         let Some((channel, message)) = reader.next()? else { break };
         // What others draw is not what was recorded.
-        if !channel.is_drawn() && !lines.add(&channel, &message)? {
+        if channel.is_drawn() {
+            continue;
+        }
+        let message = JsonMessage::of(&channel, &message);
+        if let Some(why) = message.unreadable() {
+            let (count, _) = unreadable.get_or_insert_with(|| (0, format!("{}: {why}", channel.topic)));
+            *count += 1;
+        }
+        if !lines.add(&message)? {
             return Ok(ExitCode::SUCCESS);
         }
     }
     drop(line);
+    if let Some((count, first)) = unreadable {
+        complain(format_args!(
+            "{count} messages are written as bytes (`hex`), since they could not be decoded (`unreadable` says why); \
+             the first is of {}",
+            plain::line(&first)
+        ));
+    }
     if let Some((messages, bytes)) = lines.finish()? {
         say(format_args!("{}: {messages} messages, {}", to.display(), size(bytes)));
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// A message. Numbers that JSON does not have are texts in its value: `"NaN"`, `"inf"`, `"-inf"`.
 #[derive(Serialize)]
-struct JsonMessage<'a> {
+pub(super) struct JsonMessage<'a> {
     topic: &'a str,
     stamp_ns: u64,
     epoch: u64,
@@ -67,8 +67,8 @@ impl JsonLines {
     }
 
     /// Writes a message; false when nobody reads any more.
-    pub(super) fn add(&mut self, channel: &RecordedChannel, message: &Message<'_>) -> Result<bool, Failure> {
-        let line = serde_json::to_string(&json_message(channel, message))?;
+    pub(super) fn add(&mut self, message: &JsonMessage<'_>) -> Result<bool, Failure> {
+        let line = serde_json::to_string(message)?;
         match self {
             Self::Stdout => Ok(say(line)),
             Self::File(file) => {
@@ -101,10 +101,18 @@ impl JsonFile {
     }
 }
 
-fn json_message<'a>(channel: &'a RecordedChannel, message: &Message<'_>) -> JsonMessage<'a> {
-    let Message { arrival_ns, stamp_ns, epoch, sequence, data } = *message;
-    let (repeated, content) = (channel.is_repeated(), content(channel, data));
-    JsonMessage { topic: &channel.topic, stamp_ns, epoch, arrival_ns, sequence, repeated, content }
+impl<'a> JsonMessage<'a> {
+    /// A message of a recording.
+    pub(super) fn of(channel: &'a RecordedChannel, message: &Message<'_>) -> Self {
+        let Message { arrival_ns, stamp_ns, epoch, sequence, data } = *message;
+        let (repeated, content) = (channel.is_repeated(), content(channel, data));
+        Self { topic: &channel.topic, stamp_ns, epoch, arrival_ns, sequence, repeated, content }
+    }
+
+    /// Why its bytes are given as they are; none if they are not.
+    pub(super) fn unreadable(&self) -> Option<&str> {
+        if let JsonContent::Bytes { unreadable, .. } = &self.content { Some(unreadable) } else { None }
+    }
 }
 
 fn content<'a>(channel: &'a RecordedChannel, data: &[u8]) -> JsonContent<'a> {
@@ -145,7 +153,7 @@ mod tests {
 
     fn line(channel: &RecordedChannel, data: &[u8]) -> String {
         let message = Message { arrival_ns: 12, stamp_ns: 10, epoch: 1, sequence: 3, data };
-        serde_json::to_string(&json_message(channel, &message)).unwrap()
+        serde_json::to_string(&JsonMessage::of(channel, &message)).unwrap()
     }
 
     #[test]
@@ -178,5 +186,12 @@ mod tests {
         assert!(line(&channel(None, "json"), br#"{"x": [1]}"#).ends_with(r#""value":{"x":[1]}}"#));
         let told = line(&channel(None, "cdr"), &[0, 1, 0xfe]);
         assert!(told.ends_with(r#""encoding":"cdr","hex":"0001fe"}"#), "{told}");
+        let message = Message { arrival_ns: 12, stamp_ns: 10, epoch: 1, sequence: 3, data: &[0; 4] };
+        // More units than a message of four bytes may have: its sender may be right all the same.
+        let units = channel(Some(Type::Array(1 << 20, Box::new(Type::Unit))), "postcard");
+        let why = JsonMessage::of(&units, &message).unreadable().unwrap().to_owned();
+        assert!(why.contains("more than ") && why.contains("values"), "{why}");
+        let bytes = channel(Some(Type::Array(4, Box::new(Type::U8))), "postcard");
+        assert_eq!(JsonMessage::of(&bytes, &message).unreadable(), None);
     }
 }

@@ -129,8 +129,9 @@ struct RepeatArguments {
     ])]
     exact: bool,
     /// With --exact: this program runs, with the arguments behind `--`, and no word of the recorded command. It is
-    /// given the settings that were recorded: which files and devices they name, `record info --json` shows.
-    #[arg(long, value_name = "PATH", requires = "exact", conflicts_with_all = ["config", "list"])]
+    /// given the settings that were recorded: which files and devices they name, `record info --json` shows; what of
+    /// them is otherwise in --config is told before it runs.
+    #[arg(long, value_name = "PATH", requires = "exact", conflicts_with = "list")]
     program: Option<PathBuf>,
     /// The arguments of --program.
     #[arg(last = true, value_name = "ARGUMENT", requires = "program")]

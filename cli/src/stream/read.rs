@@ -12,6 +12,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+/// While nothing comes it is asked so often whether the writer is in error.
+const WRITER_LOOK: Duration = Duration::from_secs(1);
+
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost stream read odometry.0 odometry                  the newest record
@@ -106,6 +109,7 @@ impl StreamReading<'_> {
         }
         let (patience, stop) = (seconds(self.arguments.timeout)?, Stop::new()?);
         let (mut count, mut last_at, mut told) = (0, Instant::now(), self.reader.missed());
+        let mut look_at = last_at + WRITER_LOOK;
         while !stop.within(Duration::ZERO) {
             let next = self.reader.next_timeout_into(&mut self.body, LOOK);
             let next = next.map_err(|error| self.chosen.failure(&error))?;
@@ -124,6 +128,10 @@ impl StreamReading<'_> {
                 }
                 Next::Nothing if !patience.is_zero() && last_at.elapsed() >= patience => {
                     return Err(format!("stream {}: no record within {patience:?}", self.chosen.text()).into());
+                }
+                Next::Nothing if Instant::now() >= look_at => {
+                    look_at = Instant::now() + WRITER_LOOK;
+                    self.chosen.running.in_error(self.chosen.id.name).map_or(Ok(()), Err)?;
                 }
                 Next::Lost(_) | Next::Nothing => {}
             }

@@ -3,7 +3,7 @@
 
 use super::{Builtin, description};
 use rohrpost_config::{
-    GUI, Installation, Module, Problem, Program, RECORDER, REPLAY, RecordedItems, Show, nearest, size_text,
+    Document, GUI, Installation, Module, Problem, Program, RECORDER, REPLAY, RecordedItems, Show, nearest, size_text,
 };
 use rohrpost_mailbox::{BODY_BYTES_MAX, Name};
 use rohrpost_modules::common::DataHead;
@@ -13,13 +13,14 @@ use std::collections::BTreeSet;
 /// Everything that built-in modules would refuse, by their settings, by what they call, by the sections of their
 /// streams, and by what is to be shown and recorded of them. What programs of one's own would refuse only they know.
 pub fn check(installation: &Installation) -> Vec<Problem> {
+    let document = installation.document();
     let mut problems = Vec::new();
     for module in &installation.modules {
         let Program::Builtin(name) = &module.program else { continue };
-        problems.extend(Builtin::find(name).map(|builtin| (builtin.check)(installation, module)).unwrap_or_default());
+        problems.extend(Builtin::find(name).map(|builtin| (builtin.check)(&document, module)).unwrap_or_default());
         // The streams of a player are those of its recording.
         if name != REPLAY {
-            problems.extend(unknown_streams(installation, module, name));
+            problems.extend(unknown_streams(&document, module, name));
         }
     }
     for show in &installation.gui.show {
@@ -27,7 +28,7 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
         problems.extend(far_stream_of(installation, show));
     }
     if let Some(record) = &installation.record {
-        problems.extend(installation.modules.iter().filter_map(|module| settings_of_recorder(installation, module)));
+        problems.extend(installation.modules.iter().filter_map(|module| settings_of_recorder(&document, module)));
         let streams = record.streams.iter().filter_map(|items| item_of(installation, items, true));
         problems.extend(streams.chain(record.data.iter().filter_map(|items| item_of(installation, items, false))));
     }
@@ -37,17 +38,19 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
 /// Everything that built-in modules would refuse of the values that were saved of their parameters, by line of that
 /// file.
 pub fn check_saved(installation: &Installation) -> Vec<Problem> {
+    let document = installation.document();
     let wrong = installation.modules.iter().filter_map(|module| {
         let Program::Builtin(name) = &module.program else { return None };
-        let error = (Builtin::find(name)?.check_saved)(installation, module)?;
+        let error = (Builtin::find(name)?.check_saved)(&document, module)?;
         Some(Problem { line: Some(error.line), message: format!("[\"{}\"]: {}", error.module, error.message) })
     });
     wrong.collect()
 }
 
 /// Sections for streams that no interface of a built-in module has.
-fn unknown_streams(installation: &Installation, module: &Module, builtin: &str) -> Vec<Problem> {
-    let classes = module.names().filter_map(|name| installation.classes.name(name.class()));
+fn unknown_streams(document: &Document<'_>, module: &Module, builtin: &str) -> Vec<Problem> {
+    let classes_of = &document.installation().classes;
+    let classes = module.names().filter_map(|name| classes_of.name(name.class()));
     let descriptions: Vec<Description> = classes.filter_map(|class| description(builtin, class)).collect();
     let items = descriptions.iter().flat_map(Description::streams);
     let known: BTreeSet<&str> = items.map(|item| item.field.name.as_str()).collect();
@@ -57,9 +60,9 @@ fn unknown_streams(installation: &Installation, module: &Module, builtin: &str) 
             None if known.is_empty() => "it has none; drop the section".into(),
             None => format!("it has {}", known.iter().copied().collect::<Vec<_>>().join(", ")),
         };
-        let name = installation.classes.format(module.name);
+        let name = classes_of.format(module.name);
         Problem {
-            line: Some(installation.stream_line(module, stream)),
+            line: Some(document.stream_line(module, stream)),
             message: format!("module `{name}`: the builtin has no stream `{stream}`; {right}"),
         }
     };
@@ -73,11 +76,11 @@ fn description_of(installation: &Installation, name: Name) -> Option<Description
 }
 
 /// The recorder has its section in place of settings.
-fn settings_of_recorder(installation: &Installation, module: &Module) -> Option<Problem> {
+fn settings_of_recorder(document: &Document<'_>, module: &Module) -> Option<Problem> {
     let is_it = module.program == Program::Builtin(RECORDER.into());
     let key = module.settings.keys().next().filter(|_| is_it)?;
-    let name = installation.classes.format(module.name);
-    let line = Some(installation.settings_line(module, key));
+    let name = document.installation().classes.format(module.name);
+    let line = Some(document.settings_line(module, key));
     Some(Problem { line, message: format!("module `{name}`: it has no settings; write `{key}` into [record]") })
 }
 
@@ -154,6 +157,35 @@ mod tests {
     fn told(text: &str) -> Vec<String> {
         let installation = Installation::parse(text, Path::new("robot.toml")).unwrap();
         check(&installation).into_iter().map(|problem| problem.message).collect()
+    }
+
+    /// So many modules, each with a mistake in its settings.
+    fn mistakes(count: usize) -> Installation {
+        let mut text = "installation = \"many\"\n[system]\nname = \"robot\"\nid = 1\n[nodes.main]\n".to_owned();
+        let classes = (0..count.div_ceil(256)).map(|class| format!("p{class} = {{ id = {} }}\n", 100 + class));
+        text += &format!("[classes]\ntool = {{ id = 16 }}\n{}", classes.collect::<String>());
+        for module in 0..count {
+            let name = format!("p{}.{}", module / 256, module % 256);
+            text += &format!("[[module]]\nname = \"{name}\"\nbuiltin = \"pilot\"\nsettings = {{ wrong = 1 }}\n");
+        }
+        Installation::parse(&text, Path::new("robot.toml")).unwrap_or_else(|errors| panic!("{errors}"))
+    }
+
+    /// Time of the processor for this thread, whatever else the computer does.
+    fn processor_ns() -> u64 {
+        let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
+        told.split(' ').next().unwrap().parse().unwrap()
+    }
+
+    #[test]
+    fn ten_times_as_many_mistakes_take_about_ten_times_as_long() {
+        // As many in sum, and enough of them for a clock that goes by ticks.
+        let times = [100, 1000].map(|count| {
+            let (installation, before) = (mistakes(count), processor_ns());
+            (0..10_000 / count).for_each(|_| assert_eq!(check(&installation).len(), count));
+            processor_ns() - before
+        });
+        assert!(times[1] < 3 * times[0], "{times:?} ns");
     }
 
     /// The file with its last replica, that of the picture, changed.

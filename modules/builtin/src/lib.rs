@@ -18,7 +18,7 @@ mod sim;
 pub use check::{check, check_saved};
 
 use rohrpost_config::{
-    Installation, Module as Configured, Problem, RECORDER, REPLAY, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER,
+    Document, Module as Configured, Problem, RECORDER, REPLAY, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER,
 };
 use rohrpost_modules::Module;
 use rohrpost_modules::interface::{Interface, Interfaces};
@@ -29,8 +29,8 @@ use rohrpost_modules::schema::Description;
 /// What can be done with a built-in module.
 struct Builtin {
     run: fn(Start) -> Result<(), StartError>,
-    check: fn(&Installation, &Configured) -> Vec<Problem>,
-    check_saved: fn(&Installation, &Configured) -> Option<SettingsError>,
+    check: fn(&Document<'_>, &Configured) -> Vec<Problem>,
+    check_saved: fn(&Document<'_>, &Configured) -> Option<SettingsError>,
     /// One for each class that it can answer to.
     descriptions: fn() -> Vec<Description>,
 }

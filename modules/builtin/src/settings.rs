@@ -1,6 +1,6 @@
 //! What one built-in module would refuse of its settings, its aliases and what it calls.
 
-use rohrpost_config::{Installation, Module as Configured, Problem, SettingsError};
+use rohrpost_config::{Document, Installation, Module as Configured, Problem, SettingsError};
 use rohrpost_modules::Module;
 use rohrpost_modules::interface::Interfaces;
 use serde::de::DeserializeOwned;
@@ -63,20 +63,20 @@ pub(super) struct Called<'a> {
 
 /// What a built-in module would refuse of the values that were saved of its parameters.
 pub(super) fn saved<M: Module<Settings: Settings>>(
-    installation: &Installation,
+    document: &Document<'_>,
     module: &Configured,
 ) -> Option<SettingsError> {
-    let saved = installation.saved.as_ref()?;
-    let settings: M::Settings = installation.settings_without_saved(module).ok()?;
-    let names = saved.check_names(installation, module, &settings.parameters());
-    names.and_then(|()| installation.settings_as::<M::Settings>(module).map(drop)).err()
+    let settings: M::Settings = document.settings_without_saved(module).ok()?;
+    let names = document.saved()?.check_names(module, &settings.parameters());
+    names.and_then(|()| document.settings_as::<M::Settings>(module).map(drop)).err()
 }
 
 /// What a built-in module would refuse.
-pub(super) fn module<M: Module<Settings: Settings>>(installation: &Installation, module: &Configured) -> Vec<Problem> {
+pub(super) fn module<M: Module<Settings: Settings>>(document: &Document<'_>, module: &Configured) -> Vec<Problem> {
+    let installation = document.installation();
     let what = format!("module `{}`", installation.classes.format(module.name));
     let mut problems = aliases::<M>(installation, module, &what);
-    let settings: M::Settings = match installation.settings_without_saved(module) {
+    let settings: M::Settings = match document.settings_without_saved(module) {
         Ok(settings) => settings,
         Err(error) => {
             let message = format!("{what}: settings: {}", error.message);
@@ -85,7 +85,7 @@ pub(super) fn module<M: Module<Settings: Settings>>(installation: &Installation,
         }
     };
     if let Err(error) = settings.check() {
-        let line = Some(installation.settings_line(module, error.key));
+        let line = Some(document.settings_line(module, error.key));
         problems.push(Problem { line, message: format!("{what}: settings: {error}") });
     }
     for recorded in settings.recorded() {
@@ -96,7 +96,7 @@ pub(super) fn module<M: Module<Settings: Settings>>(installation: &Installation,
     }
     for called in settings.calls() {
         problems.extend(wrong_call(installation, module, &called).map(|message| Problem {
-            line: Some(installation.settings_line(module, called.key)),
+            line: Some(document.settings_line(module, called.key)),
             message: format!("{what}: settings: `{}` {message}", called.key),
         }));
     }

@@ -41,7 +41,7 @@ const EARLIER: usize = 1;
 /// When the file was not closed or is damaged, has no such name, or the new one cannot be written.
 pub fn cut(path: &Path, to: &Path, selection: &Selection, progress: &mut Progress<'_>) -> Result<(u64, u64), CutError> {
     let mut selected = Selected::open(path, selection)?;
-    let mut new = Rewriter::create(to, &header_of_made([Contents::header_of(path)?.as_ref()]))?;
+    let mut new = Rewriter::create(to, &header_of_made([Contents::header_of(path)?.as_ref()]), [path])?;
     selected.each_metadata(new.keeps_theirs(), |its| {
         Ok::<_, CutError>(new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?)
     })?;

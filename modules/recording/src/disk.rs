@@ -1,9 +1,9 @@
 //! The few things that recording asks of a disk. Tests put one in its place that fails.
 
 use nix::sys::statvfs::statvfs;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions, Permissions, TryLockError};
 use std::io::{self, Write};
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 use std::time::Duration;
 
@@ -11,10 +11,13 @@ use std::time::Duration;
 const LOCK_TRIES: usize = 20;
 const LOCK_RETRY: Duration = Duration::from_millis(1);
 
+/// Permissions of a recording that is for its user alone.
+pub(crate) const FILE_MODE: u32 = 0o600;
+
 /// Where files are made.
 pub(crate) trait Disk: Send {
-    /// A new file; never one that is there.
-    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>>;
+    /// A new file with these permissions; never one that is there.
+    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>>;
 
     /// What this user may still write.
     fn free_bytes(&mut self, folder: &Path) -> io::Result<u64>;
@@ -54,6 +57,12 @@ pub(crate) fn open_to_read(path: &Path) -> io::Result<File> {
     Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file; name a file of a recording (*.mcap)"))
 }
 
+/// Permissions of a new file made of these: what each of them lets others do. Settings stand in them.
+pub(crate) fn mode_of<'a>(sources: impl IntoIterator<Item = &'a Path>) -> u32 {
+    let mode = |path: &Path| path.metadata().map_or(FILE_MODE, |there| there.mode());
+    sources.into_iter().fold(0o666, |all, path| all & mode(path)) | FILE_MODE
+}
+
 /// Takes the lock by which others see that the file is being written, as long as it is open. A reader that looks just
 /// then has it for a moment: it is tried again behind a `rest`. Where there are no locks, it is written all the same.
 fn lock(file: &File, mut rest: impl FnMut()) {
@@ -69,8 +78,10 @@ fn lock(file: &File, mut rest: impl FnMut()) {
 pub(crate) struct RealDisk;
 
 impl Disk for RealDisk {
-    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
+        let file = OpenOptions::new().write(true).create_new(true).mode(FILE_MODE).open(path)?;
+        // By the file, so the umask has no say. A disk without permissions gives each file the same.
+        let _ = file.set_permissions(Permissions::from_mode(mode));
         lock(&file, || std::thread::sleep(LOCK_RETRY));
         Ok(Box::new(file))
     }

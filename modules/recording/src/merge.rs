@@ -56,7 +56,8 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
         return Err(MergeError::Nothing);
     }
     let headers = paths.iter().map(|path| Contents::header_of(path)).collect::<Result<Vec<_>, _>>()?;
-    let mut new = Rewriter::create(to, &header_of_made(headers.iter().map(Option::as_ref)))?;
+    let header = header_of_made(headers.iter().map(Option::as_ref));
+    let mut new = Rewriter::create(to, &header, paths.iter().map(PathBuf::as_path))?;
     // Channels of others may have one topic and different types.
     let types = if new.keeps_theirs() { BTreeMap::new() } else { check_types(paths)? };
     let names = paths.iter().enumerate().map(|(at, path)| (format!("{:04}", at + 1), file_name(path)));

@@ -1,5 +1,6 @@
 //! What a recording is told at its start.
 
+use crate::disk::FILE_MODE;
 use crate::drawn::DrawnBeside;
 use crate::rotate::Rotation;
 use std::collections::BTreeMap;
@@ -13,6 +14,8 @@ pub struct Options {
     pub folder: PathBuf,
     /// Files are made here and below only, wherever links lead; looked at for each file. None: anywhere.
     pub root: Option<PathBuf>,
+    /// Permissions of each file, whatever the umask says.
+    pub mode: u32,
     /// How their names begin: `STEM-0001.mcap`.
     pub stem: String,
     /// When the next file begins.
@@ -37,6 +40,7 @@ impl Options {
         Self {
             folder: folder.into(),
             root: None,
+            mode: FILE_MODE,
             stem: stem.into(),
             rotation: Rotation::default(),
             flush: Duration::from_millis(500),

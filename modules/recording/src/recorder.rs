@@ -250,7 +250,7 @@ impl Recorder {
         loop {
             let path = rotate::path(&self.options.folder, &self.options.stem, self.number);
             self.check_root(&path)?;
-            match OpenFile::create(&mut *self.disk, &path) {
+            match OpenFile::create(&mut *self.disk, &path, self.options.mode) {
                 Err(DiskError::Other { error, .. })
                     if error.kind() == io::ErrorKind::AlreadyExists && self.number < NUMBER_MAX =>
                 {

@@ -78,7 +78,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
     let header = Contents::header_of(path)?;
     frames.seek(mcap::MAGIC.len() as u64)?;
     let mut contents = Contents::new(frames, known);
-    let mut new = Rewriter::create(to, &header_of_made([header.as_ref()]))?;
+    let mut new = Rewriter::create(to, &header_of_made([header.as_ref()]), [path])?;
     let (mut damages, mut unchecked) = (Damages::default(), 0);
     while let Some(item) = contents.next()? {
         progress(contents.at(), contents.file_bytes());

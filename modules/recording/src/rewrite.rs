@@ -1,6 +1,6 @@
 //! A new file from what others have. It gets its name once it is whole.
 
-use crate::disk::{Disk, RealDisk};
+use crate::disk::{Disk, RealDisk, mode_of};
 use crate::error::{Damage, DiskError, ReadError, RewriteError};
 use crate::format::{CHUNK_BYTES_MAX, MESSAGE_OVERHEAD_BYTES, is_of_others, key};
 use crate::part_file::PartFile;
@@ -30,9 +30,14 @@ pub(crate) struct Rewriter {
 }
 
 impl Rewriter {
-    /// Begins one.
-    pub(crate) fn create(to: &Path, header: &Header) -> Result<Self, RewriteError> {
-        let (part, made) = PartFile::create(to, |path| RealDisk.create(path))?;
+    /// Begins one, with this header, of these sources.
+    pub(crate) fn create<'a>(
+        to: &Path,
+        header: &Header,
+        sources: impl IntoIterator<Item = &'a Path>,
+    ) -> Result<Self, RewriteError> {
+        let mode = mode_of(sources);
+        let (part, made) = PartFile::create(to, |path| RealDisk.create(path, mode))?;
         let file = OpenFile::begin(&mut RealDisk, part.path(), made, header)?;
         Ok(Self {
             file: Some(file),

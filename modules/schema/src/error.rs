@@ -115,6 +115,20 @@ pub enum WalkProblem {
     FieldTwice,
 }
 
+impl WalkProblem {
+    /// Whether it is more than is decoded here, and may be right all the same: its sender is not at fault.
+    ///
+    /// ```
+    /// use rohrpost_schema::{Type, decode};
+    /// let many = decode(&Type::List(Box::new(Type::Unit)), &[0xff, 0xff, 0xff, 0x07]).unwrap_err();
+    /// let cut = decode(&Type::F64, &[0; 7]).unwrap_err();
+    /// assert_eq!([many, cut].map(|error| error.problem.is_limit()), [true, false]);
+    /// ```
+    pub fn is_limit(&self) -> bool {
+        matches!(self, Self::TooManyEmpty | Self::TooManyValues { .. } | Self::TooDeep)
+    }
+}
+
 fn count(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }

@@ -18,6 +18,8 @@ pub(super) struct Health {
     error: String,
     /// That is why it is in error now, which is the one of this number.
     present: Option<u32>,
+    /// It is on all the same, and only says what does not work: that is no error any more when it is over.
+    is_complaint: bool,
 }
 
 /// A part of a module's code that has not come back for long.
@@ -35,7 +37,7 @@ impl Stuck {
 
 impl Health {
     pub(super) fn new(busy_after: Duration, now: Instant) -> Self {
-        Self { busy_after, look_at: now, told_ns: None, error: String::new(), present: None }
+        Self { busy_after, look_at: now, told_ns: None, error: String::new(), present: None, is_complaint: false }
     }
 
     /// When to look again. A part that begins after a look is not long before `busy_after` is over once more.
@@ -57,17 +59,31 @@ impl Health {
     /// two looks it may have been switched on again, and failed anew.
     pub(super) fn asks_why(&mut self, in_error: Option<u32>) -> Option<u32> {
         self.present = self.present.filter(|present| in_error == Some(*present));
+        self.end_complaint();
         in_error.filter(|_| self.present.is_none())
     }
 
     /// Why it went into error, and into which one, if that is known.
     pub(super) fn went_into_error(&mut self, number: Option<u32>, why: String) {
-        (self.error, self.present) = (why, number);
+        (self.error, self.present, self.is_complaint) = (why, number, false);
+    }
+
+    /// What does not work although it is on, and which of its complaints that is.
+    pub(super) fn complained(&mut self, number: u32, why: String) {
+        (self.error, self.present, self.is_complaint) = (why, Some(number), true);
+    }
+
+    fn end_complaint(&mut self) {
+        if self.is_complaint && self.present.is_none() {
+            self.error.clear();
+            self.is_complaint = false;
+        }
     }
 
     /// Its process has ended; if it failed, so.
     pub(super) fn ended(&mut self, failure: Option<&String>) {
         self.present = None;
+        self.end_complaint();
         if let Some(failure) = failure {
             self.error.clone_from(failure);
         }
@@ -127,5 +143,21 @@ mod tests {
         assert_eq!(health.asks_why(Some(5)), Some(5), "that may be another one");
         health.ended(Some(&"ended with 1".into()));
         assert_eq!((health.present_error(), health.error()), (None, "ended with 1"));
+    }
+
+    #[test]
+    fn a_complaint_is_forgotten_when_it_is_over() {
+        let mut health = Health::new(Duration::from_secs(1), Instant::now());
+        let ends: [fn(&mut Health); 2] = [|health| _ = health.asks_why(None), |health| health.ended(None)];
+        for end in ends {
+            assert_eq!(health.asks_why(Some(1)), Some(1));
+            health.complained(1, "records nothing".into());
+            assert_eq!((health.asks_why(Some(1)), health.error()), (None, "records nothing"));
+            end(&mut health);
+            assert_eq!((health.present_error(), health.error()), (None, ""));
+        }
+        health.went_into_error(Some(2), "no port".into());
+        health.ended(None);
+        assert_eq!(health.error(), "no port", "an error is the last one for good");
     }
 }

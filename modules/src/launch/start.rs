@@ -206,9 +206,13 @@ impl Launch {
             // Of this error, if it is in no later one even now.
             Some(Ok(status)) if child.in_trouble(&self.node) == Some(error) => {
                 let why = if status.error.is_empty() { "it does not say why".into() } else { status.error };
-                let how = if status.state == State::Error { " is in error" } else { "" };
+                let is_error = status.state == State::Error;
+                let how = if is_error { " is in error" } else { "" };
                 let note = format!("{}{how}: {}", child.text(), plain::line(&why));
-                child.health().went_into_error(Some(error), why);
+                match is_error {
+                    true => child.health().went_into_error(Some(error), why),
+                    false => child.health().complained(error, why),
+                }
                 self.note(Some(note));
             }
             Some(_) => {}

@@ -85,6 +85,8 @@ pub struct Context {
     outside: Vec<OpenedFile>,
     /// When ticks and periods are due.
     pub(crate) schedule: Schedule,
+    /// What does not work, as the module itself says; empty: all does.
+    pub(super) complaint: String,
     scratch: Vec<u8>,
 }
 
@@ -126,6 +128,7 @@ impl Context {
             watches: None,
             outside: Vec::new(),
             schedule,
+            complaint: String::new(),
             scratch: Vec::new(),
         }
     }
@@ -253,6 +256,19 @@ impl Context {
     /// ```
     pub fn use_computer_clock(&mut self) {
         self.schedule.use_computer_clock();
+    }
+
+    /// Says what does not work although the module is on, until it says something else; empty: all works. `list`,
+    /// `status` and `top` show it.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::Context;
+    /// fn look_at_the_disk(context: &mut Context, is_full: bool) {
+    ///     context.complain(if is_full { "the disk is full: nothing is kept" } else { "" });
+    /// }
+    /// ```
+    pub fn complain(&mut self, complaint: impl Into<String>) {
+        self.complaint = complaint.into();
     }
 
     /// A proxy of the module that a setting names, such as `motor.0`.

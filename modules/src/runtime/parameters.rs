@@ -97,7 +97,8 @@ pub(crate) fn check_start<M: MadeModule>(
 ) -> Result<(), StartError> {
     let mut set = module.parameters();
     if let Some(saved) = &installation.saved {
-        saved.check_names(installation, config, &set.as_ref().map_or_else(Vec::new, |set| set.names()))?;
+        let names = set.as_ref().map_or_else(Vec::new, |set| set.names());
+        saved.document(installation).check_names(config, &names)?;
     }
     let Some(set) = set.as_mut() else { return Ok(()) };
     for (index, parameter) in (0..set.names().len()).filter_map(|index| Some((index, set.get(index)?))) {

@@ -136,8 +136,9 @@ impl<M: MadeModule> Running<M> {
         self.context.link.unseen().borrow_mut().collect();
         if self.life.state == ModuleState::On {
             self.context.followings.renew(&mut self.context.link.unseen().borrow_mut(), Instant::now());
-            let Context { followings, followed_streams, .. } = &self.context;
-            self.life.complains(followings.complaint().or_else(|| followed_streams.complaint()));
+            let Context { followings, followed_streams, complaint, .. } = &self.context;
+            let of_others = followings.complaint().or_else(|| followed_streams.complaint());
+            self.life.complains(of_others.or(Some(complaint.as_str())));
         }
         let moment = self.context.deliver_due();
         if self.life.state == ModuleState::On && self.context.schedule.take_tick(moment) {

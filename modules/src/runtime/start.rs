@@ -159,7 +159,7 @@ impl Start {
                 StartError::Mailbox(text, error)
             })
         };
-        let settings = installation.settings_as(module)?;
+        let settings = installation.document().settings_as(module)?;
         let mut stand_ins = checked(stand_ins(&settings, &installation), &installation, module)?;
         let mut endpoints = Vec::new();
         for name in module.names() {

@@ -1,7 +1,7 @@
 //! What all kinds of datagrams have in common: numbers at fixed places, and why bytes are none.
 
 /// Version of this format. The first four bytes, the check and a refusal are the same in all.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
 /// Why bytes are no valid frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]

@@ -18,6 +18,9 @@ const OLD_KEPT: usize = 8;
 const RESTARTS_TOLD_NS: u64 = 5_000_000_000;
 /// Datagrams of an old incarnation are in flight for this long at most; after that, its router still runs.
 const OLD_GONE_NS: u64 = 2_000_000_000;
+/// A leap after which nothing goes on from before for so long was none of a forger: a peer that is there says so twice
+/// a second.
+pub(super) const LEAP_KEPT_NS: u64 = 10_000_000_000;
 
 /// State of a peer.
 #[derive(Debug, Default)]
@@ -47,6 +50,8 @@ struct Leap {
     /// The sequence that was expected before.
     from: u64,
     at_ns: u64,
+    /// When something came last of what was passed over; at first when it leapt.
+    before_ns: u64,
 }
 
 /// Refusals to one address.
@@ -144,10 +149,16 @@ impl PeerReceiver {
 
     /// Whether the sequence of a datagram is plausible. A peer that did not reach us for long is far ahead, too. One is
     /// far behind if the only datagram of it so far was forged; or if those were that were far ahead: then nothing
-    /// follows them for a second, and the peer goes on from before.
+    /// follows them for a second, and the peer goes on from before. Once it has not for [`LEAP_KEPT_NS`], they are true
+    /// for good: what comes from before then is a duplicate.
     fn is_plausible(&mut self, now_ns: u64, head: &FrameHead, is_silent: bool) -> bool {
         let next = self.window.next();
         let is_ahead = head.sequence >= next + WINDOW;
+        self.leap = self.leap.filter(|leap| now_ns.saturating_sub(leap.before_ns) < LEAP_KEPT_NS);
+        let passed_over = |leap: &Leap| (leap.from..next.saturating_sub(WINDOW)).contains(&head.sequence);
+        if let Some(leap) = self.leap.as_mut().filter(|leap| passed_over(leap)) {
+            leap.before_ns = now_ns;
+        }
         let goes_on = is_silent && self.leap.is_some_and(|leap| head.sequence >= leap.from);
         let is_behind = head.sequence + WINDOW < next && (!self.is_sure || goes_on);
         if !is_ahead && !is_behind {
@@ -170,7 +181,7 @@ impl PeerReceiver {
     /// A leap from this sequence on. One shortly after another is a part of it.
     fn leap_from(&self, now_ns: u64, next: u64) -> Leap {
         let before = self.leap.filter(|leap| now_ns.saturating_sub(leap.at_ns) < OLD_GONE_NS);
-        Leap { from: before.map_or(next, |leap| leap.from), at_ns: now_ns }
+        Leap { from: before.map_or(next, |leap| leap.from), at_ns: now_ns, before_ns: now_ns }
     }
 
     fn end_incarnation(&mut self, way: &PeerContext<'_>, deliver: &mut impl Deliver) {

@@ -120,7 +120,7 @@ mod tests {
     fn a_difference_names_both_sides_and_the_remedy() {
         let mismatch = |reason, digest| Mismatch { reason, version: 9, digest };
         for (mismatch, words) in [
-            (mismatch(RefusalReason::Version, None), ["wire format 9", "this one 1", "same version of Rohrpost"]),
+            (mismatch(RefusalReason::Version, None), ["wire format 9", "this one 2", "same version of Rohrpost"]),
             (
                 mismatch(RefusalReason::Digest, Some(0xab)),
                 ["00000000000000ab", "0000000000001234", "from the same file"],

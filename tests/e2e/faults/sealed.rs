@@ -1,13 +1,13 @@
 //! Nodes that seal their datagrams: nothing can be read, strangers are refused, and keys can be changed.
 
-use super::strangers::of_version_2;
+use super::strangers::of_earlier_version;
 use super::{Field, LOG, configure, lines};
 use crate::harness::{OUTPUT, signal, wait};
 use crate::process::Said;
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::LinkState;
 use rohrpost::{CallError, Fault};
-use rohrpost_routers::frame::{FrameHead, FrameKind};
+use rohrpost_routers::frame::{FrameHead, FrameKind, VERSION};
 use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -191,16 +191,17 @@ fn a_sealed_node_says_that_another_speaks_another_wire_format() {
     let head = FrameHead { kind, system: 1, from: 1, to: 0, digest, incarnation: 9, sequence: 0 };
     let counted = || field.links("base").rejections.into_iter().find(|rejected| rejected.cause == "version");
     let rejected = wait("base counts", || {
-        arm.send_to(&of_version_2(&head), ("10.78.0.1", 21117)).unwrap();
+        arm.send_to(&of_earlier_version(&head), ("10.78.0.1", 21117)).unwrap();
         counted()
     });
     assert!(rejected.node == "arm" && rejected.datagrams > 0, "{rejected:?}");
     wait("callers are told", || {
-        arm.send_to(&of_version_2(&head), ("10.78.0.1", 21117)).unwrap();
-        let told = |fault: &Fault| matches!(fault, Fault::NodeRefuses { why, .. } if why.contains("wire format 2"));
+        arm.send_to(&of_earlier_version(&head), ("10.78.0.1", 21117)).unwrap();
+        let told = |fault: &Fault| matches!(fault, Fault::NodeRefuses { why, .. } if why.contains("wire format 1"));
         Some(field.fault("base", "probe.1")).filter(told)
     });
-    let words = ["takes nothing from node arm (10.78.0.2)", "wire format 2, ours is 1", "same version of Rohrpost"];
+    let ours = format!("wire format 1, ours is {VERSION}");
+    let words = ["takes nothing from node arm (10.78.0.2)", ours.as_str(), "same version of Rohrpost"];
     field.wait_told("router.0", &words, 1);
     field.stop();
 }

@@ -6,7 +6,7 @@ use crate::harness::{OUTPUT, PATIENCE, wait};
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_config::Installation;
-use rohrpost_routers::frame::{Frame, FrameHead, FrameKind, HEAD_BYTES, RefusalReason};
+use rohrpost_routers::frame::{Frame, FrameHead, FrameKind, HEAD_BYTES, RefusalReason, VERSION};
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
@@ -72,11 +72,11 @@ fn crc32(bytes: impl Iterator<Item = u8>) -> u32 {
     !bytes.fold(!0, |rest, byte| (0..8).fold(rest ^ u32::from(byte), |rest, _| divide(rest)))
 }
 
-/// A datagram as a router of version 2 would send it, of which version 1 knows the first four bytes and the check.
-pub(super) fn of_version_2(head: &FrameHead) -> Vec<u8> {
-    let body = b"what comes in version 2";
+/// A datagram as a router of version 1 sent it, of which later ones know the first four bytes and the check.
+pub(super) fn of_earlier_version(head: &FrameHead) -> Vec<u8> {
+    let body = b"what comes in version 1";
     let mut datagram = [&head.to_bytes(&[body]), &body[..]].concat();
-    datagram[2] = 2;
+    datagram[2] = 1;
     let check = crc32(datagram[..HEAD_BYTES - 4].iter().chain(&datagram[HEAD_BYTES..]).copied());
     datagram[HEAD_BYTES - 4..HEAD_BYTES].copy_from_slice(&check.to_le_bytes());
     datagram
@@ -106,23 +106,24 @@ fn a_node_with_another_version_is_refused_by_both_versions_and_told_so_once_a_se
     // Until three refusals have arrived: at most one a second, and with the right reason.
     while refusals < 3 {
         assert!(begun.elapsed() < PATIENCE, "told {refusals} times");
-        desk.send_to(&of_version_2(&head), ("10.78.0.1", 21117)).unwrap();
+        desk.send_to(&of_earlier_version(&head), ("10.78.0.1", 21117)).unwrap();
         sent += 1;
         let Ok((length, _)) = desk.recv_from(&mut bytes) else { continue };
         // Besides refusals it learns that the base is there.
         if let Ok((_, Frame::Refusal(refusal))) = Frame::parse(&bytes[..length]) {
-            assert_eq!((refusal.version, refusal.reason), (1, RefusalReason::Version));
+            assert_eq!((refusal.version, refusal.reason), (VERSION, RefusalReason::Version));
             assert_eq!(refusal.digest, field.digest());
             refusals += 1;
         }
     }
     assert!(begun.elapsed() > Duration::from_secs(2), "three refusals of {sent} datagrams in {:?}", begun.elapsed());
 
-    let words = ["takes nothing from node desk (10.78.0.3)", "it speaks wire format 2, this one 1", "rohrpost version"];
+    let differ = format!("it speaks wire format 1, this one {VERSION}");
+    let words = ["takes nothing from node desk (10.78.0.3)", differ.as_str(), "rohrpost version"];
     field.wait_told("router.0", &words, 1);
     let fault = field.fault("base", "probe.2");
     assert!(matches!(&fault, Fault::NodeRefuses { node, .. } if node == "desk"), "{fault:?}");
-    assert!(fault.to_string().contains("it speaks wire format 2, this one 1"), "{fault}");
+    assert!(fault.to_string().contains(&differ), "{fault}");
     let peer = field.peer("base", "desk");
     assert_eq!((peer.received.datagrams, peer.received.packages), (0, 0), "nothing of it was taken");
     assert_eq!(field.lines("router.0", &words).len(), 1, "told once");

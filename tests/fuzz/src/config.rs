@@ -43,13 +43,14 @@ fn all_of(installation: &Installation) {
         let _ = (explain(installation, Some(&node.name)), node.launch_instance(), node.tools_by_hand());
         let _ = installation.modules_on(&node.name).count();
     }
+    let document = installation.document();
     for module in &installation.modules {
         assert_eq!(installation.module(module.name).map(|found| found.name), Some(module.name));
         let _ = (module.memory(), installation.scheduling(module.name.class()), installation.output_level(module.name));
         assert_eq!(installation.node_of(module.name), Some(module.node.as_str()));
-        for settings in [installation.settings_as::<toml::Table>(module), installation.settings_without_saved(module)] {
+        for settings in [document.settings_as::<toml::Table>(module), document.settings_without_saved(module)] {
             for key in settings.unwrap_or_else(|error| panic!("settings are a table: {error}")).keys() {
-                assert!(installation.settings_line(module, key) <= installation.text.lines().count());
+                assert!(document.settings_line(module, key) <= installation.text.lines().count());
             }
         }
     }

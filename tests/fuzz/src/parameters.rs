@@ -23,15 +23,16 @@ pub(crate) fn run(data: &[u8]) {
         Err(errors) => return validate(&errors, file),
     };
     let lines = file.lines().count();
+    let document = saved.document(&INSTALLATION);
     for module in saved.modules() {
-        let values = saved.values::<Value>(&INSTALLATION, module);
+        let values = document.values::<Value>(module);
         for value in values.unwrap_or_else(|error| panic!("checked before: {error}")) {
             assert!((1..=lines).contains(&value.line), "`{}` in line {} of {lines}", value.name, value.line);
             taken(&value.value);
         }
         let known: Vec<_> = INSTALLATION.module(module).into_iter().collect();
         assert_eq!(known.len(), 1);
-        if let Err(error) = saved.check_names(&INSTALLATION, known[0], &["cruise-m-s"]) {
+        if let Err(error) = document.check_names(known[0], &["cruise-m-s"]) {
             assert!((1..=lines).contains(&error.line));
         }
     }
@@ -40,8 +41,9 @@ pub(crate) fn run(data: &[u8]) {
     for problem in check_saved(&with) {
         assert!(!problem.message.is_empty());
     }
+    let document = with.document();
     for module in &with.modules {
-        let _ = with.settings_as::<toml::Table>(module);
+        let _ = document.settings_as::<toml::Table>(module);
     }
 }
 

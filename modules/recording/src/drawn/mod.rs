@@ -106,7 +106,7 @@ pub fn draw(
 ) -> Result<Drawn, DrawError> {
     let mut selected = Selected::open(path, selection)?;
     let mut drawing = Drawing::new(&selected, options)?;
-    let mut new = Rewriter::create(to, &our_header())?;
+    let mut new = Rewriter::create(to, &our_header(), [path])?;
     selected.each_metadata(false, |its| {
         if options.with_original || its.name != metadata::LOST {
             new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?;

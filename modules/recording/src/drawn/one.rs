@@ -119,7 +119,9 @@ impl Origin<'_> {
     fn points(&self, mut points: PackedPoints, bytes_max: usize) -> Vec<DrawnPart> {
         let is_reduced = points.reduce(bytes_max);
         let frame = if points.is_in_world { WORLD } else { self.carrier };
-        let drawn = PointCloud { timestamp: self.timestamp(), frame_id: frame.into(), ..points.cloud };
+        // Points are in their frame itself; readers, such as Rerun, refuse a cloud that does not say so.
+        let pose = Some(PlanePose::ORIGIN.in_space());
+        let drawn = PointCloud { timestamp: self.timestamp(), frame_id: frame.into(), pose, ..points.cloud };
         vec![DrawnPart { kind: Kind::Points, is_reduced, data: drawn.encode_to_vec() }]
     }
 }

@@ -2,6 +2,7 @@
 
 use super::TWICE_BYTES_MAX;
 use super::drawer::{Drawer, DrawnMessage};
+use super::poses::PlanePose;
 use super::proto::{PointCloud, RawImage};
 use crate::format::{MESSAGE_ENCODING, SCHEMA_ENCODING, key};
 use crate::read::definitions::{Definition, SchemaText};
@@ -85,6 +86,17 @@ fn of_a_long_cloud_every_kth_point_that_is_seen_is_drawn() {
     assert_eq!(places(&drawn_cloud), wanted);
     let (whole, is_reduced) = one::<PointCloud>(&drawn(&cloud, None), "eye.0/sight/points");
     assert_eq!((whole.data.len(), is_reduced), (15_000 * 16, false));
+}
+
+#[test]
+fn each_cloud_has_a_pose() {
+    let pose = Some(types::Pose { x_m: 1.0, y_m: 2.0, heading_rad: 0.0 });
+    let scan = LaserScan { start_rad: 0.0, step_rad: 0.1, range_max_m: 9.0, ranges_m: vec![1.0], pose: None };
+    let cloud = types::PointCloud { points: Bytes(vec![0; 12]), ..types::PointCloud::empty(1, 1, PointFormat::Xyz) };
+    for drawn in [drawn(&scan, None), drawn(&LaserScan { pose, ..scan }, None), drawn(&cloud, None)] {
+        let (cloud, _) = one::<PointCloud>(&drawn, "eye.0/sight/points");
+        assert_eq!(cloud.pose, Some(PlanePose::ORIGIN.in_space()), "{}", cloud.frame_id);
+    }
 }
 
 #[test]

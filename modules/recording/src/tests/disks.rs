@@ -53,11 +53,11 @@ fn full() -> io::Error {
 }
 
 impl Disk for FailingDisk {
-    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
         if self.chance.fails(self.faults.create) {
             return Err(io::Error::from(io::ErrorKind::ReadOnlyFilesystem));
         }
-        let file = RealDisk.create(path)?;
+        let file = RealDisk.create(path, mode)?;
         Ok(Box::new(FailingFile { file, faults: self.faults, chance: self.chance.clone() }))
     }
 

@@ -34,9 +34,9 @@ impl DyingDisk {
 struct DyingFile(Box<dyn DiskFile>, DyingDisk);
 
 impl Disk for DyingDisk {
-    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
         self.lives()?;
-        Ok(Box::new(DyingFile(RealDisk.create(path)?, self.clone())))
+        Ok(Box::new(DyingFile(RealDisk.create(path, mode)?, self.clone())))
     }
 
     fn free_bytes(&mut self, _: &Path) -> io::Result<u64> {

@@ -60,8 +60,8 @@ fn each_message_is_in_one_file_or_counted_as_lost() {
 struct SmallDisk(Arc<AtomicU64>);
 
 impl Disk for SmallDisk {
-    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        RealDisk.create(path)
+    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
+        RealDisk.create(path, mode)
     }
 
     fn free_bytes(&mut self, _: &Path) -> io::Result<u64> {

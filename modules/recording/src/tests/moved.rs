@@ -22,8 +22,8 @@ struct FullDisk {
 struct FullFile(Box<dyn DiskFile>, Arc<AtomicI64>);
 
 impl Disk for FullDisk {
-    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        let file = RealDisk.create(path)?;
+    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
+        let file = RealDisk.create(path, mode)?;
         Ok(if path.starts_with(&self.folder) { Box::new(FullFile(file, self.writes.clone())) } else { file })
     }
 

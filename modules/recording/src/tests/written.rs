@@ -9,6 +9,8 @@ use crate::{
 use proptest::prelude::*;
 use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
 use std::collections::BTreeMap;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
 use std::time::Duration;
 
 proptest! {
@@ -45,6 +47,27 @@ proptest! {
             prop_assert_eq!(epoch.messages, all.iter().filter(|said| said.epoch == epoch.epoch).count() as u64);
         }
     }
+}
+
+#[test]
+fn a_file_is_for_its_user_alone_and_what_is_made_of_files_lets_in_nobody_else_than_all_of_them() {
+    let folder = memory_folder();
+    let mode = |path: &Path| path.metadata().unwrap().permissions().mode() & 0o777;
+    let open = |stem: &str, mode| {
+        let path = file_of(folder.path(), stem, &said(10, 20));
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+        path
+    };
+    assert_eq!(mode(&file_of(folder.path(), "own", &said(10, 20))), 0o600);
+    let for_group = Options { mode: 0o660, stem: "group".into(), ..options(folder.path()) };
+    record(Box::new(RealDisk), for_group, &said(10, 20));
+    assert_eq!(mode(&folder.path().join("group-0001.mcap")), 0o660, "whatever the umask says");
+    let (group, all) = (open("a", 0o640), open("b", 0o664));
+    let made = ["cut.mcap", "merged.mcap", "recovered.mcap"].map(|name| folder.path().join(name));
+    cut(&all, &made[0], &Selection::default(), &mut |_, _| {}).unwrap();
+    merge(&[group.clone(), all], &made[1], &mut |_, _| {}).unwrap();
+    recover(&group, &made[2], &mut |_, _| {}).unwrap();
+    assert_eq!(made.each_ref().map(|path| mode(path)), [0o664, 0o640, 0o640]);
 }
 
 #[test]

@@ -100,8 +100,8 @@ impl Copies {
 
 impl OpenFile {
     /// Makes a new one.
-    pub(crate) fn create(disk: &mut dyn Disk, path: &Path) -> Result<Self, DiskError> {
-        let file = disk.create(path).map_err(|error| DiskError::new("make the file", path, error))?;
+    pub(crate) fn create(disk: &mut dyn Disk, path: &Path, mode: u32) -> Result<Self, DiskError> {
+        let file = disk.create(path, mode).map_err(|error| DiskError::new("make the file", path, error))?;
         Self::begin(disk, path, file, &our_header())
     }
 

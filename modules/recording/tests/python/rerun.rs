@@ -18,6 +18,12 @@ fn rerun(arguments: &[&str], file: &Path) -> String {
     String::from_utf8(told.stdout).unwrap()
 }
 
+/// Converts a recording, and has Rerun check what it made of it.
+fn convert(path: &Path, rrd: &Path) {
+    rerun(&["mcap", "convert", "-o", rrd.to_str().unwrap()], path);
+    rerun(&["rrd", "verify"], rrd);
+}
+
 /// Components of each entity with their values, of chunks with one row. Those about channels are left out.
 fn entities(printed: &str) -> BTreeMap<String, BTreeMap<String, String>> {
     let mut all: BTreeMap<String, BTreeMap<String, String>> = BTreeMap::new();
@@ -43,7 +49,7 @@ fn rerun_finds_each_drawn_channel_with_its_content() {
     let (to, rrd) = (folder.path().join("drawn.mcap"), folder.path().join("drawn.rrd"));
     let options = DrawOptions { classes: BTreeMap::from([(140, "pilot".to_owned())]), ..DrawOptions::default() };
     draw(&path, &to, &Selection::default(), &options, &mut |_, _| {}).unwrap();
-    rerun(&["mcap", "convert", "-o", rrd.to_str().unwrap()], &to);
+    convert(&to, &rrd);
     let all = entities(&rerun(&["rrd", "print", "-vvv"], &rrd));
     for (entity, component, wanted) in [
         ("/world/transform", "Transform3D:translation", "[[0.0, 0.0, 0.0]]"),
@@ -82,7 +88,7 @@ fn rerun_finds_the_picture_and_the_points_in_a_recording() {
     let folder = tempfile::tempdir().unwrap();
     let all = [sight("camera.0", "image", &long_picture().0), sight("depth.0", "points", &long_cloud().0)];
     let (path, rrd) = (record_drawn(folder.path(), 1, &all), folder.path().join("drawn.rrd"));
-    rerun(&["mcap", "convert", "-o", rrd.to_str().unwrap()], &path);
+    convert(&path, &rrd);
     let all = entities(&rerun(&["rrd", "print", "-vvv"], &rrd));
     // Long lists are printed up to some place.
     for (entity, component, wanted) in [

@@ -90,7 +90,7 @@ fn all_are_known(installation: &Installation, module: &Module, served: &[ServedS
     let unknown = module.streams.keys().find(|name| !known.contains(&name.as_str()));
     let Some(unknown) = unknown else { return Ok(()) };
     let known = if known.is_empty() { "it has none".into() } else { format!("it has `{}`", known.join("`, `")) };
-    let place = format!("{}:{}", installation.path.display(), installation.stream_line(module, unknown));
+    let place = format!("{}:{}", installation.path.display(), installation.document().stream_line(module, unknown));
     let module = installation.classes.format(module.name);
     Err(StartError::NoStream { place, module, stream: unknown.clone(), known })
 }

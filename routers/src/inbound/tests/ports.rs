@@ -3,6 +3,7 @@
 use super::*;
 use crate::frame::{Alive, FrameHead, FrameKind};
 use crate::harness::address;
+use crate::inbound::peer::LEAP_KEPT_NS;
 use crate::link::{PeerLinkState, SILENT_AFTER_NS};
 use crate::outbound::Outbound;
 use crate::port::Port;
@@ -92,6 +93,31 @@ fn forged_datagrams_that_are_far_ahead_part_a_peer_for_a_second() {
         assert_eq!(taken(), before + 29, "it is heard again, after one that is doubted");
         own.iter().for_each(|datagram| base.take(START + SILENT_AFTER_NS, 1, datagram));
         assert_eq!(taken(), before + 29, "and nothing twice");
+    }
+}
+
+/// What a peer passed over when it went far ahead is not taken again for ever, however silent it is.
+#[test]
+fn a_leap_that_nothing_contradicts_is_true_for_good() {
+    for (is_contradicted, taken_again) in [(false, 0), (true, 29)] {
+        let mut base = End::new(0, |_| {});
+        let own = sent(Port::Packages, 60);
+        own[..20].iter().for_each(|datagram| base.take(START, 1, datagram));
+        let incarnation = base.stats.peer(1).link.incarnation.get();
+        let mut now_ns = START;
+        let (step_ns, steps) = (SILENT_AFTER_NS / 2, 3 * LEAP_KEPT_NS / SILENT_AFTER_NS);
+        for at in 0..steps {
+            now_ns += step_ns;
+            base.take(now_ns, 1, &alive(Port::Packages, incarnation, (1 << 40) + at));
+            if is_contradicted {
+                base.take(now_ns, 1, &own[20 + at as usize % 10]);
+            }
+        }
+        let stats = base.stats.clone();
+        let taken = || stats.peer(1).received.datagrams.get();
+        let before = taken();
+        own[30..].iter().for_each(|datagram| base.take(now_ns + SILENT_AFTER_NS, 1, datagram));
+        assert_eq!(taken(), before + taken_again, "contradicted: {is_contradicted}");
     }
 }
 

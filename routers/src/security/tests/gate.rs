@@ -1,7 +1,7 @@
 //! The gate asks as often as it must, and no more often.
 
 use super::*;
-use crate::frame::{BadFrame, RefusalReason};
+use crate::frame::{BadFrame, RefusalReason, VERSION};
 use crate::harness::{End, MS, S, START, address};
 use crate::inbound::Envelope;
 use crate::inbound::TICK_EVERY_NS;
@@ -86,13 +86,13 @@ fn an_unknown_peer_is_challenged_again_and_again_and_one_with_another_incarnatio
 fn another_wire_format_is_reported_by_its_receiver_and_changes_nothing() {
     let (mut a, mut b) = (Router::new(0), Router::new(1));
     let (_, mut question) = a.ask(START).swap_remove(0);
-    question[2] = 2;
+    question[2] = VERSION + 1;
     crate::frame::write_check(&mut question);
     assert_eq!(b.take(START, 0, &question), None);
     let told = RouterEvent::Rejected {
         source: address(0),
         peer: Some(0),
-        why: NotOpened::Bad(BadFrame::Version(2)),
+        why: NotOpened::Bad(BadFrame::Version(VERSION + 1)),
         datagrams: 1,
     };
     assert_eq!(b.end.log.events, [told]);
@@ -181,7 +181,7 @@ fn a_cause_is_believed_of_the_silent_alone() {
     let (mut other_id, mut other_key) = (keyed(ring(&[2])), keyed(KeyRing::new(key_of(1, [9; KEY_BYTES]), None)));
     let (other_id, other_key) = (other_id.ask(START)[0].1.clone(), other_key.ask(START)[0].1.clone());
     let mut version = other_id.clone();
-    version[2] = 2;
+    version[2] = VERSION + 1;
     crate::frame::write_check(&mut version);
     let unsealed = {
         let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
@@ -194,10 +194,10 @@ fn a_cause_is_believed_of_the_silent_alone() {
     assert_eq!(state(&b, START), PeerLinkState::Unknown, "it may be heard yet, and packages go to it");
     let mut now_ns = START + 2 * S;
     for (datagram, reason, wire) in [
-        (&other_id, RefusalReason::Key, crate::frame::VERSION),
-        (&other_key, RefusalReason::Key, crate::frame::VERSION),
-        (&version, RefusalReason::Version, 2),
-        (&unsealed, RefusalReason::Sealed, crate::frame::VERSION),
+        (&other_id, RefusalReason::Key, VERSION),
+        (&other_key, RefusalReason::Key, VERSION),
+        (&version, RefusalReason::Version, VERSION + 1),
+        (&unsealed, RefusalReason::Sealed, VERSION),
     ] {
         now_ns += 10 * S;
         assert_eq!(state(&b, now_ns), PeerLinkState::Silent, "what was said is over");
