@@ -69,6 +69,7 @@ mod replayed;
 mod replayed_answers;
 mod replayed_others;
 mod replicas;
+mod replicas_delayed;
 mod replicas_lossy;
 mod replicas_sealed;
 mod replicas_tcp;

@@ -11,6 +11,7 @@ mod joining;
 mod lives;
 mod lossy;
 mod older;
+mod overtaken;
 mod requests;
 mod sealed;
 mod slow;
