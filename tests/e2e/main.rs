@@ -76,6 +76,7 @@ mod replicas_tcp;
 mod restart;
 mod screen;
 mod seer;
+mod set_clock;
 #[path = "../../mailbox/tests/common/small_memory.rs"]
 mod small_memory;
 mod start;
