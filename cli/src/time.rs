@@ -148,8 +148,7 @@ fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {
         Some(client) => round.newest_of(client, TcpInterface::LINK).map(|(_, link)| told.by_tcp(link)),
         // A node alone on its LAN has no router: its time is the common one.
         None if installation.network.is_none() => {
-            told.by_page(clock.record().filter(|_| told.node == round.running.node_name));
-            Ok(None)
+            told.by_page(clock.record().filter(|_| told.node == round.running.node_name))
         }
         None => round.newest(&told.node, RouterInterface::CLOCK).map(|(_, clock)| {
             let now_ns = clock.now_ns;
@@ -173,10 +172,14 @@ impl NodeTime {
     }
 
     /// Takes what the page of this node says.
-    fn by_page(&mut self, page: Option<TimeRecord>) {
-        let Some(record) = page else { return };
+    fn by_page(&mut self, page: Option<TimeRecord>) -> Result<Option<u64>, String> {
+        let Some(record) = page else { return Ok(None) };
+        if !record.is_known() {
+            return Err(format!("it has no time yet: that of the {} has not begun", record.source.name()));
+        }
         (self.source, self.epoch) = (Some(record.source.name()), Some(record.epoch));
         self.clock_set_by_ns = record.clock_set_by(monotonic_ns(), realtime_ns());
+        Ok(None)
     }
 
     fn row(&self) -> [String; 11] {

@@ -1,5 +1,4 @@
-//! A computer that starts in 1970, as one without a battery does, and whose clock is set while a node runs; and one that
-//! is set back.
+//! A computer that starts in 1970, as one without a battery does. Its clock is set while a node runs, and set back.
 
 use crate::harness::{NETWORK, OUTPUT, Place, Robot, probe, wait};
 use crate::lan::addresses;
@@ -118,7 +117,7 @@ fn a_node_that_follows_its_clock_begins_an_epoch_when_that_is_set() {
     computer.place.assert_empty();
 }
 
-/// Both nodes see the clock that is set; whoever asks, it is the master that begins the epoch.
+/// Both nodes see the clock that is set; on whichever it is asked for, the master begins the epoch.
 #[test]
 fn nodes_follow_a_master_that_begins_an_epoch_when_it_is_asked_from_anywhere_or_by_itself() {
     for when_set in ["tell", "new-epoch"] {

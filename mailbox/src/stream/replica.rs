@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Several records are begun at a time ([`StreamShape::begun_max`]): older ones of which something is missing, and
-//! newer ones that arrive. Small ones are filled in drafts; of others there are two at most, each in a frame of its own.
-//! A ring has one frame to spare, so the second is one that no reader holds at present; if readers hold them all, the
-//! caller gives up the older.
+//! newer ones that arrive. Small ones are filled in drafts; of others there are two at most, each in a frame of its
+//! own. A ring has one frame to spare, so the second is one that no reader holds at present; if readers hold them all,
+//! the caller gives up the older.
 
 use crate::about;
 use crate::name::Name;

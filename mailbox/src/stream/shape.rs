@@ -136,8 +136,8 @@ impl StreamShape {
         self.record_bytes as usize <= RACING_BYTES_MAX
     }
 
-    /// How many records of a replica of this shape may be begun at a time. Small ones overtake each other on a network
-    /// whose delay varies; they are filled beside the ring, and all that are whole fit into it at once.
+    /// How many records of a replica of this shape may be begun at a time. Small ones overtake each other where the
+    /// delay of the network varies; they are filled beside the ring, and all that are whole fit into it at once.
     ///
     /// ```
     /// use rohrpost_mailbox::StreamShape;

@@ -6,7 +6,8 @@ use crate::runtime::ToolLink;
 use rohrpost_mailbox::Name;
 use serde::Serialize;
 
-/// Launch of any node, asked by a tool. The first argument is the name of that launch ([`launcher_of`](super::launcher_of)).
+/// Launch of any node, asked by a tool. The first argument is the name of that launch
+/// ([`launcher_of`](super::launcher_of)).
 impl ToolLink {
     /// How it stands with all modules that launch watches over, in the order of the configuration.
     ///

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! A newer record that is whole waits for older ones as long as an answer takes: a pose is late by one round trip when
-//! the one before it was lost or overtaken, and never by more. A record of which no part came is known by the next one,
+//! the one before it was lost or reordered, and never by more. A record of which no part came is known by the next one,
 //! which says how far behind it is: so what the sender left out on purpose is never asked for.
 
 mod due;

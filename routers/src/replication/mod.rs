@@ -13,7 +13,7 @@
 //! Lost parts are asked for, within bounds on both ends:
 //!
 //! - The receiver has two records of a replica open at most, of small ones up to eight: older ones that were asked for
-//!   or overtaken, and a newer one that arrives. One too many, or the replica's deadline, ends the oldest; a newer one
+//!   or reordered, and a newer one that arrives. One too many, or the replica's deadline, ends the oldest; a newer one
 //!   that is whole waits for older ones as long as an answer takes. Of a record of which nothing came it knows by the
 //!   next one, since that says which was sent before: what was left out on purpose is never asked for. This is worth it
 //!   for small records, too: it costs one request for a lost pose, and delays the next pose by one round trip.

@@ -11,7 +11,7 @@ mod joining;
 mod lives;
 mod lossy;
 mod older;
-mod overtaken;
+mod reordered;
 mod requests;
 mod sealed;
 mod slow;

@@ -1,4 +1,5 @@
-//! A network whose delay varies by more than the time from one small record to the next: they overtake each other.
+//! A network with a delay that varies by more than the time from one small record to the next: they overtake each
+//! other.
 
 use super::stepped::Lines;
 use super::*;
