@@ -78,6 +78,11 @@ impl Round {
         })
     }
 
+    /// The link that asks.
+    pub(super) fn tool(&mut self) -> &mut ToolLink {
+        &mut self.tool
+    }
+
     /// Ends the polling.
     pub(super) fn close(self) {
         self.tool.close();

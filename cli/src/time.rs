@@ -1,19 +1,27 @@
-//! `rohrpost time`: which node is the master of time, and the error bound of each other node.
+//! `rohrpost time`: which node is the master of time, the error bound of each other node, and a new epoch at the
+//! computer's clock.
 
 use super::round::{Round, Rounds};
 use super::table::{table, time};
+use super::units::date;
 use crate::terminal::{Failure, say};
-use rohrpost::interfaces::{BeyondLink, BeyondTime, ClockRole, ClockState, RouterInterface, TcpInterface};
-use rohrpost_config::{Installation, Reach, TimeSource};
-use rohrpost_mailbox::SystemClock;
+use rohrpost::interfaces::{
+    BeyondLink, BeyondTime, ClockRole, ClockState, NewEpochError, RouterInterface, TcpInterface,
+};
+use rohrpost::launch::clock_was_set;
+use rohrpost::launcher::launcher_of;
+use rohrpost::wire::from_bytes;
+use rohrpost_config::{Reach, TimeSource};
+use rohrpost_mailbox::{SystemClock, TimeRecord, monotonic_ns, realtime_ns};
 use serde::Serialize;
 use std::process::ExitCode;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost time              all nodes, once
   rohrpost time --watch      repeatedly; Ctrl-C ends it
+  rohrpost time --new-epoch  system time goes on from the computer's clock, which was set
 `bound`: largest possible error against the master's time. `off`: error measured at the last exchange with the \
     master. `way`: shortest recent round trip; a bound cannot be much less than half of it. `ago`: age of the report. \
     Two nodes of the same term and epoch differ by at most the sum of their bounds. Exit code 1: a node does not \
@@ -21,7 +29,17 @@ use std::time::Duration;
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,
+    /// Begin a new epoch at the clock of the master's computer; with one node, at this computer's clock.
+    #[arg(long, conflicts_with_all = ["watch", "json"])]
+    new_epoch: bool,
 }
+
+/// The function of a router that begins one.
+const NEW_EPOCH: u16 = 16;
+/// A new epoch begins within this time.
+const BEGINS_WITHIN: Duration = Duration::from_secs(5);
+/// It is looked so often whether it has.
+const BEGINS_LOOK: Duration = Duration::from_millis(100);
 
 /// A node's report of its time.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -36,6 +54,15 @@ struct NodeTime {
     round_trip_ns: Option<u64>,
     /// Age of the report, by this node's system time, ns; negative if this node's time is behind.
     ago_ns: Option<i64>,
+    /// How far the computer's clock was set away from system time, ns; positive: it is ahead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clock_set_by_ns: Option<i64>,
+    /// Where the time of a node without a router comes from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    source: Option<&'static str>,
+    /// The epoch of a node without a router.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    epoch: Option<u64>,
     /// Why there is no report.
     failure: Option<String>,
 }
@@ -48,8 +75,14 @@ struct NodeTimes {
     nodes: Vec<NodeTime>,
 }
 
-pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
-    let mut round = rounds.begin(alone)?;
+pub(super) fn run(Arguments { rounds, new_epoch }: &Arguments) -> Result<ExitCode, Failure> {
+    let mut round = rounds.begin(|_| None)?;
+    if *new_epoch {
+        let begun = begin_epoch(&mut round);
+        round.close();
+        say(begun?);
+        return Ok(ExitCode::SUCCESS);
+    }
     let clock = SystemClock::open(&round.running.node);
     let agree = loop {
         let told = round.nodes().into_iter().map(|node| ask(&mut round, &clock, node)).collect();
@@ -63,15 +96,47 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
     Ok(if agree || rounds.watch { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Where the time of an installation of one node comes from; none of several.
-fn alone(installation: &Installation) -> Option<String> {
-    let time = match installation.time {
-        TimeSource::Local | TimeSource::Master { .. } => "its own clock is the time",
-        TimeSource::Simulation { .. } => "its time is that of the simulation",
-        TimeSource::Log => "its time is that of the log that is played there",
+/// Has the teller of system time begin a new epoch at its computer's clock, and waits until it is there.
+fn begin_epoch(round: &mut Round) -> Result<String, Failure> {
+    let installation = &round.running.installation;
+    let ended = match &installation.time {
+        TimeSource::Simulation { .. } | TimeSource::Log => {
+            return Err("system time is that of a simulation or a log, which no clock of a computer sets".into());
+        }
+        TimeSource::Local => {
+            let on_lan = installation.nodes.iter().find(|node| node.reach != Reach::Tcp);
+            let node = on_lan.map_or(round.running.node_name.clone(), |node| node.name.clone());
+            let launcher = launcher_of(installation, &node).ok_or_else(|| format!("no node `{node}`"))?;
+            let begun = round.tool().new_epoch(launcher);
+            begun.map_err(|error| format!("launch of node {node}: {error}"))?.saturating_sub(1)
+        }
+        TimeSource::Master { masters, .. } => {
+            let names = masters.iter().filter_map(|index| installation.nodes.get(usize::from(*index)));
+            let names: Vec<String> = names.map(|node| node.name.clone()).collect();
+            let is_master = |name: &&String| {
+                round.newest(name, RouterInterface::CLOCK).is_ok_and(|(_, clock)| clock.role == ClockRole::Master)
+            };
+            let master = names.iter().find(is_master).ok_or("no node is master of time: see `rohrpost time`")?;
+            let router = round.running.installation.router_of(master).ok_or("the master has no router")?;
+            let begun: Result<u64, NewEpochError> = round
+                .tool()
+                .call(router, NEW_EPOCH, RouterInterface::hash(), |_| Ok(()), |bytes| from_bytes(bytes))
+                .map_err(|error| round.running.told(router, &error))?;
+            begun.map_err(|error| format!("router of node {master}: {error}"))?
+        }
     };
-    let instead = || format!("this installation has one node, and {time}; `rohrpost top` shows it");
-    (installation.nodes.len() <= 1).then(instead)
+    let clock = SystemClock::open(&round.running.node);
+    let deadline = Instant::now() + BEGINS_WITHIN;
+    loop {
+        let now = clock.now();
+        if now.epoch > ended {
+            return Ok(format!("epoch {} of time: {}", now.epoch, date(now.ns)));
+        }
+        if Instant::now() > deadline {
+            return Err(format!("epoch {ended} goes on here; `rohrpost time` shows how the nodes stand").into());
+        }
+        std::thread::sleep(BEGINS_LOOK);
+    }
 }
 
 fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {
@@ -81,10 +146,13 @@ fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {
     let client = installation.tcp_client_of(&told.node).filter(|_| is_beyond);
     let asked = match client {
         Some(client) => round.newest_of(client, TcpInterface::LINK).map(|(_, link)| told.by_tcp(link)),
-        // A node alone on its LAN has no router, and its own clock is the common time.
-        None if installation.network.is_none() => Ok(None),
+        // A node alone on its LAN has no router: its time is the common one.
+        None if installation.network.is_none() => {
+            told.by_page(clock.record().filter(|_| told.node == round.running.node_name))
+        }
         None => round.newest(&told.node, RouterInterface::CLOCK).map(|(_, clock)| {
             let now_ns = clock.now_ns;
+            told.clock_set_by_ns = clock.clock_set_by_ns;
             told.clock = Some(clock);
             Some(now_ns)
         }),
@@ -101,6 +169,17 @@ impl NodeTime {
     fn by_tcp(&mut self, link: BeyondLink) -> Option<u64> {
         (self.beyond, self.round_trip_ns) = (link.time, link.round_trip_ns);
         self.beyond.as_ref().map(|time| time.now_ns)
+    }
+
+    /// Takes what the page of this node says.
+    fn by_page(&mut self, page: Option<TimeRecord>) -> Result<Option<u64>, String> {
+        let Some(record) = page else { return Ok(None) };
+        if !record.is_known() {
+            return Err(format!("it has no time yet: that of the {} has not begun", record.source.name()));
+        }
+        (self.source, self.epoch) = (Some(record.source.name()), Some(record.epoch));
+        self.clock_set_by_ns = record.clock_set_by(monotonic_ns(), realtime_ns());
+        Ok(None)
     }
 
     fn row(&self) -> [String; 11] {
@@ -129,8 +208,9 @@ impl NodeTime {
                 [node, "by TCP".into(), master, none(), epoch, bound(told.error_ns), none(), none(), way, none(), ago]
             }
             (None, None) => {
-                let own = || String::from("own");
-                [node, own(), none(), none(), none(), us(0.0), none(), none(), none(), none(), ago]
+                let epoch = self.epoch.map_or_else(none, |epoch| epoch.to_string());
+                let role = self.source.filter(|source| *source != "local").unwrap_or("own").into();
+                [node, role, none(), none(), epoch, us(0.0), none(), none(), none(), none(), ago]
             }
         }
     }
@@ -163,6 +243,11 @@ impl NodeTimes {
         for told in &self.nodes {
             if let Some(failure) = &told.failure {
                 text += &format!("{}: {failure}\n", told.node);
+            }
+            if let Some(by_ns) = told.clock_set_by_ns {
+                let is_slave = told.clock.as_ref().is_some_and(|clock| clock.role != ClockRole::Master);
+                let advice = if is_slave { "" } else { "; `rohrpost time --new-epoch` begins a new epoch at it" };
+                text += &format!("{}: {}{advice}\n", told.node, clock_was_set(by_ns));
             }
         }
         text

@@ -3,6 +3,7 @@
 use super::table::time;
 use crate::terminal::Failure;
 use rohrpost::launch::{Event, events};
+use rohrpost_builtin::format::iso;
 use rohrpost_config::size_text;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
@@ -13,6 +14,12 @@ pub(super) const LOOK: Duration = Duration::from_millis(50);
 const SECONDS_MAX: f64 = 365.0 * 86_400.0;
 /// Lowest rate: packages carry the period as whole microseconds in 32 bits, at most 71 minutes.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=1e6;
+
+/// A moment to the second, such as `2026-11-21 10:40:12 UTC`.
+pub(super) fn date(time_ns: u64) -> String {
+    let text = iso(time_ns).replace('T', " ");
+    format!("{} UTC", text.split('.').next().unwrap_or_default())
+}
 
 /// A time argument in seconds.
 pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {

@@ -12,7 +12,7 @@ use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start, 
 use crate::node::{Node, Reach};
 use crate::output::LineFormat;
 use crate::saved::{SavedDocument, SavedValue};
-use crate::time::TimeSource;
+use crate::time::{ClockSetPolicy, TimeSource};
 use crate::units::{count_text, duration_text, size_text};
 use rohrpost_mailbox::{Name, saturating_sum};
 use rohrpost_network::LEVEL_NOT_REAL_TIME;
@@ -105,6 +105,9 @@ impl Page<'_> {
             TimeSource::Log => "the log that is replayed".into(),
         };
         self.entry("time", &time);
+        if self.installation.when_set == ClockSetPolicy::NewEpoch {
+            self.entry("clock set", "by a day or more: a new epoch of time begins at the computer's clock");
+        }
         if let Some(file) = &self.installation.parameters {
             let words = format!("values saved in {} go before settings", file.display());
             self.entry("parameters", &words);

@@ -13,7 +13,7 @@ use crate::replica::Replica;
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tcp::Tcp;
-use crate::time::TimeSource;
+use crate::time::{ClockSetPolicy, TimeSource};
 use rohrpost_mailbox::{Class, Name, saturating_sum};
 use rohrpost_network::{Network, Tdma};
 use std::path::{Path, PathBuf};
@@ -50,6 +50,8 @@ pub struct Installation {
     pub tcp: Option<Tcp>,
     /// Where system time comes from.
     pub time: TimeSource,
+    /// What happens when the computer's clock was set since system time began.
+    pub when_set: ClockSetPolicy,
     /// Which classes may command which from other nodes.
     pub access: Vec<Access>,
     /// What the output service keeps.

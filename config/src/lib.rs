@@ -105,7 +105,7 @@ pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::Document;
 pub use stream::{RECORD_BYTES_MAX, StreamSpec};
 pub use tcp::{TCP_SERVER, Tcp};
-pub use time::TimeSource;
+pub use time::{ClockSetPolicy, TimeSource};
 pub use units::{
     UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,
 };

@@ -76,7 +76,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let network = file.section("network", "[network]").map(|section| network::read(section, on_lan, tdma.as_ref()));
     let keys = network.and_then(|network| network::keys_folder(&file, network.security, &folder));
     let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
-    let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
+    let (time, when_set) = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
     network::validate_count(&file, &nodes);
     network::validate(&file, on_lan, &classes);
     let tcp = file.section("tcp", "[tcp]").map(|section| Tcp::read(section, &nodes, tdma.as_ref()));
@@ -127,6 +127,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         tdma,
         tcp,
         time,
+        when_set,
         access,
         output,
         gui,

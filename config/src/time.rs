@@ -31,6 +31,32 @@ pub enum TimeSource {
     Log,
 }
 
+/// What happens when the computer's clock was set by a day or more, ahead or back, since system time began.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum ClockSetPolicy {
+    /// System time goes on, and tools say so until somebody begins a new epoch.
+    #[default]
+    Tell,
+    /// A new epoch begins at the computer's clock.
+    NewEpoch,
+}
+
+impl ClockSetPolicy {
+    const WORDS: [(&str, Self); 2] = [("tell", Self::Tell), ("new-epoch", Self::NewEpoch)];
+
+    /// The key `when-set`.
+    fn read(section: &Section<'_>, source: &TimeSource) -> Self {
+        let Some(item) = section.get("when-set") else { return Self::default() };
+        if matches!(source, TimeSource::Simulation { .. } | TimeSource::Log) {
+            item.report(
+                "`when-set` goes only with `source = \"local\"` or \"master\": a simulation and a log have a time of \
+                 their own; drop it, or change the source",
+            );
+        }
+        item.choice(&Self::WORDS).unwrap_or_default()
+    }
+}
+
 impl TimeSource {
     /// Nodes that may be master, by their place in the file; the first that runs is. None if time is not from a node.
     pub fn masters(&self) -> &[u8] {
@@ -47,7 +73,7 @@ impl TimeSource {
         file: &Section<'_>,
         nodes: &[Node],
         cycle: Option<Duration>,
-    ) -> Self {
+    ) -> (Self, ClockSetPolicy) {
         let beyond = nodes.iter().find(|node| node.reach == Reach::Tcp);
         let nodes = node::on_lan(nodes);
         let several = nodes.len() > 1;
@@ -58,7 +84,7 @@ impl TimeSource {
                      with `source = \"master\"`",
                 );
             }
-            return Self::default();
+            return Default::default();
         };
         let master = Self::Master { masters: (0..).take(nodes.len()).collect(), interval: INTERVAL };
         let words = [
@@ -122,8 +148,9 @@ impl TimeSource {
                 ));
             }
         }
+        let when_set = ClockSetPolicy::read(&section, &source);
         section.finish();
-        source
+        (source, when_set)
     }
 
     /// The part that must be equal at both ends of the wire.

@@ -1,8 +1,8 @@
 //! What other crates rely on when they use an installation.
 
 use rohrpost_config::{
-    Installation, JOURNAL, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RecordedItems, RestartPolicy,
-    Sampling, Scheduling, Start, StreamSpec, TimeSource, explain,
+    ClockSetPolicy, Installation, JOURNAL, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RecordedItems,
+    RestartPolicy, Sampling, Scheduling, Start, StreamSpec, TimeSource, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
@@ -30,6 +30,7 @@ fn every_key_arrives() {
     let base = Node { name: "base".into(), reach: Reach::Lan, address, mode: 0o770, tools: 0..=15, line: 21 };
     assert_eq!(full.node("base"), Some(&base));
     assert_eq!(full.time, TimeSource::Master { masters: vec![1, 0], interval: Duration::from_millis(500) });
+    assert_eq!(full.when_set, ClockSetPolicy::NewEpoch);
     let network = full.network.unwrap();
     assert_eq!((network.port, network.mtu, network.datagram_bytes_max, network.bulk_below), (4000, 9000, 8972, 33));
     assert_eq!((network.rate_bytes_s, network.quota_bytes), (10 << 20, 1 << 20));

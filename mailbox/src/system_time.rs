@@ -27,6 +27,8 @@ const READ_TRIES: usize = 8;
 /// The error bound of a node that does not know the time: 292 years.
 pub const ERROR_UNKNOWN_NS: u64 = i64::MAX as u64;
 const BILLION: i128 = 1_000_000_000;
+/// A computer's clock that lies so far from system time was set since system time began: a day.
+const CLOCK_SET_NS: u64 = 86_400_000_000_000;
 /// Two readings of how long a computer has slept are off by less.
 const SLEPT_NS_MIN: u64 = 5_000_000;
 
@@ -92,6 +94,16 @@ impl TimeRecord {
     pub fn after_sleep(self, slept_ns: u64) -> Self {
         let is_known = self.source != TimeSource::Master || slept_ns < SLEPT_NS_MIN;
         if is_known { self } else { Self { error_ns: ERROR_UNKNOWN_NS, drift_ns_s: 0, ..self } }
+    }
+
+    /// How far the computer's clock was set away from system time, ns; positive: it is ahead. `wall_ns`: a reading of
+    /// that clock ([`realtime_ns`]) at this moment of the monotonic clock. None: they lie less than a day apart, or
+    /// this is no time of clocks, or nobody knows it.
+    pub fn clock_set_by(&self, monotonic_ns: u64, wall_ns: u64) -> Option<i64> {
+        let is_of_clocks = matches!(self.source, TimeSource::Local | TimeSource::Master) && self.is_known();
+        let by_ns = i128::from(wall_ns) - i128::from(self.at(monotonic_ns).ns);
+        let is_set = is_of_clocks && by_ns.unsigned_abs() >= u128::from(CLOCK_SET_NS);
+        is_set.then(|| by_ns.clamp(i64::MIN.into(), i64::MAX.into()) as i64)
     }
 
     /// System time at this moment of the monotonic clock. Another process wrote the record: whatever it says, this is a

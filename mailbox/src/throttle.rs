@@ -19,7 +19,20 @@ pub struct Throttle {
 impl Throttle {
     /// Counts an event; if it is to be reported, how many there were since the last report, this one included.
     pub fn note(&mut self, now_ns: u64, every_ns: u64) -> Option<u64> {
-        self.note_burst(now_ns, every_ns, 1)
+        self.note_all(now_ns, every_ns, 1)
+    }
+
+    /// Counts so many events at once; none at all is a look whether earlier ones are to be reported now.
+    ///
+    /// ```
+    /// # use rohrpost_mailbox::Throttle;
+    /// let mut throttle = Throttle::default();
+    /// assert_eq!([(1, 5), (2, 7)].map(|(now_ns, events)| throttle.note_all(now_ns, 100, events)), [Some(5), None]);
+    /// assert_eq!([99, 101, 300].map(|now_ns| throttle.note_all(now_ns, 100, 0)), [None, Some(7), None]);
+    /// ```
+    pub fn note_all(&mut self, now_ns: u64, every_ns: u64, events: u64) -> Option<u64> {
+        self.events = self.events.saturating_add(events);
+        self.take_due(now_ns, every_ns, 1)
     }
 
     /// The same, with `burst` reports at once after a pause.

@@ -216,3 +216,49 @@ fn a_reader_finds_a_whole_record_however_its_writer_dies() {
         assert!(clock.record().is_some(), "a dead writer stops nobody");
     }
 }
+
+/// A computer that starts in 1970 and learns the time later; and one that is set back.
+#[test]
+fn a_clock_that_was_set_by_a_day_or_more_is_told_apart_from_one_that_drifts() {
+    const DAY_NS: u64 = 86_400_000_000_000;
+    let record = |source, error_ns| TimeRecord {
+        epoch: 1,
+        source,
+        monotonic_ns: 5_000,
+        system_ns: 400 * DAY_NS,
+        pace_ppb: 1_000_000_000,
+        error_ns,
+        drift_ns_s: 0,
+    };
+    let local = record(TimeSource::Local, 0);
+    for (wall_ns, by_ns) in [
+        (400 * DAY_NS, None),
+        (401 * DAY_NS - 1, None),
+        (401 * DAY_NS, Some(DAY_NS.cast_signed())),
+        (399 * DAY_NS, Some(-DAY_NS.cast_signed())),
+        (0, Some(-400 * DAY_NS.cast_signed())),
+        (u64::MAX, Some(i64::MAX)),
+    ] {
+        assert_eq!(local.clock_set_by(5_000, wall_ns), by_ns, "{wall_ns}");
+    }
+    assert!(record(TimeSource::Master, 50).clock_set_by(5_000, 0).is_some());
+    for own in
+        [record(TimeSource::Log, 0), record(TimeSource::Simulation, 0), record(TimeSource::Master, ERROR_UNKNOWN_NS)]
+    {
+        assert_eq!(own.clock_set_by(5_000, 0), None, "no clock of a computer sets it: {own:?}");
+    }
+}
+
+#[test]
+fn a_new_epoch_begins_ahead_or_back_from_the_same_source() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let mut keeper = TimeKeeper::begin(&node, TimeSource::Local, 5_000_000, 1.0).unwrap();
+    let clock = SystemClock::open(&node);
+    for (epoch, system_ns) in [(2, 1_795_733_218_000_000_000), (3, 7_000)] {
+        assert_eq!(keeper.begin_epoch(system_ns), Some(epoch));
+        let record = clock.record().unwrap();
+        assert_eq!((record.epoch, record.source, record.system_ns), (epoch, TimeSource::Local, system_ns));
+    }
+    assert_eq!(TimeKeeper::resume(&Ground::new().node()).unwrap().begin_epoch(9), None, "nobody wrote the page yet");
+}

@@ -11,8 +11,8 @@ pub use recorder::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, R
 pub use replay::{Replay, ReplayInterface, ReplayPosition, ReplayProxy, ReplayRefusal};
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkCounters,
-    LinkState, Links, PeerLink, Rejected, ReplicaCause, ReplicaState, ReplicaStates, Router, RouterInterface,
-    RouterProxy, SocketFailure,
+    LinkState, Links, NewEpochError, PeerLink, Rejected, ReplicaCause, ReplicaState, ReplicaStates, Router,
+    RouterInterface, RouterProxy, SocketFailure,
 };
 pub use slots::{SlotState, SlotUse, TunnelState};
 

@@ -2,14 +2,12 @@
 //!
 //! Launch takes the first instance of class `tool` on its node; this is the interface that it serves there.
 
+mod asking;
 mod known;
 
 pub(crate) use known::{Known, read as known_children};
 
-use crate::call::CallError;
-use crate::call::append;
 use crate::interface;
-use crate::runtime::ToolLink;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::Name;
 use rohrpost_schema::Schema;
@@ -138,6 +136,9 @@ pub enum ControlError {
     /// Launch stops all modules.
     #[error("launch is ending; it stops {0} like all others")]
     Ending(String),
+    /// A new epoch is to begin, and launch does not tell the time.
+    #[error("launch does not tell the time of this node; the master of time, a simulation or a player does")]
+    OtherTime,
 }
 
 /// Bytes of the longest look; one is some ten kilobytes.
@@ -231,6 +232,10 @@ pub trait Launcher {
     /// A further page of this look, from this byte on.
     #[command(21, idempotent)]
     fn look_on(&mut self, look: u32, from: u32, bytes_max: u16) -> Result<LookPage, LookError>;
+
+    /// Begins a new epoch of the node's time at the computer's clock; its number.
+    #[command(22)]
+    fn new_epoch(&mut self) -> Result<u64, ControlError>;
 }
 
 /// The functions' numbers.
@@ -240,6 +245,7 @@ const STOP: u16 = 18;
 const START: u16 = 19;
 pub(crate) const LOOK: u16 = 20;
 pub(crate) const LOOK_ON: u16 = 21;
+const NEW_EPOCH: u16 = 22;
 
 /// The name under which the launch of a node takes commands, if the configuration has this node.
 ///
@@ -256,120 +262,6 @@ pub fn launcher_of(installation: &Installation, node: &str) -> Option<Name> {
     Some(Name::new(installation.system.id, installation.classes.tool().0, instance, 0))
 }
 
-/// Launch of any node, asked by a tool. The first argument is the name of that launch ([`launcher_of`]).
-impl ToolLink {
-    /// How it stands with all modules that launch watches over, in the order of the configuration.
-    ///
-    /// ```
-    /// # use rohrpost_modules::{call::CallError, runtime::ToolLink};
-    /// fn failed(tool: &mut ToolLink) -> Result<Vec<String>, CallError> {
-    ///     use rohrpost_modules::launcher::Phase;
-    ///
-    ///     let states = tool.children(tool.launcher())?;
-    ///     Ok(states.into_iter().filter(|state| state.phase == Phase::Failed).map(|state| state.module).collect())
-    /// }
-    /// ```
-    ///
-    /// # Errors
-    /// See [`CallError`]; [`CallError::NotSent`] when no launch runs on that node, and this is it.
-    pub fn children(&mut self, launcher: Name) -> Result<Vec<ChildState>, CallError> {
-        let mut states = Vec::new();
-        loop {
-            let first = states.len() as u16;
-            let page: Children = self.ask_launch(launcher, CHILDREN, &(first,))?;
-            let more = !page.states.is_empty();
-            states.extend(page.states);
-            if !more || states.len() >= usize::from(page.total) {
-                return Ok(states);
-            }
-        }
-    }
-
-    /// Asks launch to restart a module (`pilot.0`); which of its processes that will be ([`ChildState::lives`]).
-    ///
-    /// ```
-    /// # use rohrpost_modules::{call::CallError, launcher::ControlError, runtime::ToolLink};
-    /// fn restart(tool: &mut ToolLink) -> Result<(), CallError<ControlError>> {
-    ///     let process = tool.restart(tool.launcher(), "pilot.0")?;
-    ///     println!("process {process} of pilot.0 begins");
-    ///     Ok(())
-    /// }
-    /// ```
-    ///
-    /// # Errors
-    /// See [`CallError`] and [`ControlError`].
-    pub fn restart(&mut self, launcher: Name, module: &str) -> Result<u32, CallError<ControlError>> {
-        self.order(launcher, RESTART, module)
-    }
-
-    /// Asks launch to stop a module.
-    ///
-    /// ```
-    /// # use rohrpost_modules::{call::CallError, launcher::ControlError, runtime::ToolLink};
-    /// fn stop(tool: &mut ToolLink) -> Result<(), CallError<ControlError>> {
-    ///     tool.stop(tool.launcher(), "pilot.0")
-    /// }
-    /// ```
-    ///
-    /// # Errors
-    /// See [`CallError`] and [`ControlError`].
-    pub fn stop(&mut self, launcher: Name, module: &str) -> Result<(), CallError<ControlError>> {
-        self.order(launcher, STOP, module)
-    }
-
-    /// Asks launch to start a module; which of its processes that will be ([`ChildState::lives`]).
-    ///
-    /// ```
-    /// # use rohrpost_modules::{call::CallError, launcher::ControlError, runtime::ToolLink};
-    /// fn start(tool: &mut ToolLink) -> Result<u32, CallError<ControlError>> {
-    ///     tool.start(tool.launcher(), "pilot.0")
-    /// }
-    /// ```
-    ///
-    /// # Errors
-    /// See [`CallError`] and [`ControlError`].
-    pub fn start(&mut self, launcher: Name, module: &str) -> Result<u32, CallError<ControlError>> {
-        self.order(launcher, START, module)
-    }
-
-    /// Begins to have a module restarted, and returns at once; [`Link::poll_for`] has the answer, a `Result` of what
-    /// [`ToolLink::restart`] returns.
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    ///
-    /// [`Link::poll_for`]: crate::call::Link::poll_for
-    pub fn begin_restart(&mut self, launcher: Name, module: &str) -> Result<u32, CallError> {
-        self.begin_asking(launcher, RESTART, &(module,))
-    }
-
-    fn order<T: serde::de::DeserializeOwned>(
-        &mut self,
-        launcher: Name,
-        function: u16,
-        module: &str,
-    ) -> Result<T, CallError<ControlError>> {
-        let result: Result<T, ControlError> =
-            self.ask_launch(launcher, function, &(module,)).map_err(CallError::widen)?;
-        result.map_err(|error| CallError::Module(launcher, error))
-    }
-
-    fn ask_launch<T: serde::de::DeserializeOwned>(
-        &mut self,
-        launcher: Name,
-        function: u16,
-        arguments: &impl Serialize,
-    ) -> Result<T, CallError> {
-        let call = self.begin_asking(launcher, function, arguments)?;
-        self.link.wait(call, |bytes| postcard::from_bytes(bytes))
-    }
-
-    fn begin_asking(&mut self, launcher: Name, function: u16, arguments: &impl Serialize) -> Result<u32, CallError> {
-        let write = |body: &mut Vec<u8>| append(body, arguments);
-        self.begin(launcher, function, LauncherInterface::hash(), write)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -381,6 +273,6 @@ mod tests {
         let numbers: Vec<(&str, u16)> = functions.iter().map(|f| (f.name.as_str(), f.number)).collect();
         let controls = [("children", CHILDREN), ("restart", RESTART), ("stop", STOP), ("start", START)];
         assert_eq!(numbers[..4], controls);
-        assert_eq!(numbers[4..], [("look", LOOK), ("look_on", LOOK_ON)]);
+        assert_eq!(numbers[4..], [("look", LOOK), ("look_on", LOOK_ON), ("new_epoch", NEW_EPOCH)]);
     }
 }

@@ -72,12 +72,14 @@ mod replayed;
 mod replayed_answers;
 mod replayed_others;
 mod replicas;
+mod replicas_delayed;
 mod replicas_lossy;
 mod replicas_sealed;
 mod replicas_tcp;
 mod restart;
 mod screen;
 mod seer;
+mod set_clock;
 #[path = "../../mailbox/tests/common/small_memory.rs"]
 mod small_memory;
 mod start;

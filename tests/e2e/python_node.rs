@@ -276,6 +276,12 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
     ] {
         assert!(looks.contains(words), "{words}: {looks}");
     }
+    // `around`, `at` and `interpolated` of the present epoch, of this one, and of the next one: however far the records
+    // are apart, of those that are too far apart, and of those that are just not.
+    let (free, apart) = ("there, there, other epoch", "gap, gap, other epoch");
+    let told: Vec<String> = serde_json::from_str(&looks).unwrap();
+    let told: Vec<&str> = told.iter().map(String::as_str).filter(|line| line.ends_with("other epoch")).collect();
+    assert_eq!(told, [free, free, free, free, apart, apart, free, free, free]);
     scene.stop();
 }
 

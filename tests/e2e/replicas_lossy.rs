@@ -170,7 +170,7 @@ impl Localising for Localiser {
     }
 }
 
-const HEAD: &str = r#"
+pub(crate) const HEAD: &str = r#"
 installation = "test"
 [system]
 name = "robot"

@@ -4,7 +4,7 @@ use super::lan::LanView;
 use super::protection::Protection;
 use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
 use rohrpost_mailbox::sys::{self, Room};
-use rohrpost_mailbox::{Node, NodeError, base_directory, saturating_sum};
+use rohrpost_mailbox::{Node, NodeError, SystemClock, base_directory, monotonic_ns, realtime_ns, saturating_sum};
 use std::path::{Path, PathBuf};
 
 const BRIDGE: &str = "rohrpost-gui-bridge";
@@ -81,6 +81,8 @@ pub(super) struct KernelFacts {
     /// The network of a configuration with several nodes.
     pub(super) lan: Option<LanView>,
     pub(super) protection: Protection,
+    /// The computer's clock, ns since 1970.
+    pub(super) wall_ns: u64,
 }
 
 /// The program that draws.
@@ -95,6 +97,8 @@ pub(super) struct NodeFound {
     pub(super) path: PathBuf,
     pub(super) seen: NodeDirectory,
     pub(super) streams: StreamsFound,
+    /// How far the computer's clock was set away from its system time, ns.
+    pub(super) clock_set_by_ns: Option<i64>,
 }
 
 /// The streams in a node's directory.
@@ -134,6 +138,7 @@ impl Machine {
             viewer: program("rerun"),
             lan,
             protection,
+            wall_ns: realtime_ns(),
             base,
         };
         Self { root: "/".into(), asked }
@@ -213,7 +218,19 @@ fn try_fifo(priority: u8) -> Result<(), String> {
 }
 
 fn nodes(base: &Path) -> Vec<NodeFound> {
-    directories(base).into_iter().map(|path| NodeFound { seen: seen(&path), streams: streams(&path), path }).collect()
+    let found = |path: PathBuf| NodeFound {
+        seen: seen(&path),
+        streams: streams(&path),
+        clock_set_by_ns: clock_set_by_ns(&path),
+        path,
+    };
+    directories(base).into_iter().map(found).collect()
+}
+
+/// None of a node that cannot be read.
+fn clock_set_by_ns(path: &Path) -> Option<i64> {
+    let node = Node::open(path).ok()?;
+    SystemClock::open(&node).record()?.clock_set_by(monotonic_ns(), realtime_ns())
 }
 
 /// Without those that cannot be read.

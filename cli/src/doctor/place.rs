@@ -2,7 +2,8 @@
 
 use super::finding::{Finding, Grade};
 use super::machine::{Bridge, Machine, Needs, NodeDirectory, StreamsFound};
-use crate::units::size;
+use crate::units::{date, size};
+use rohrpost::launch::clock_was_set;
 use std::path::Path;
 
 /// Room for tools, for mailboxes that modules create at run time, and for streams that the configuration does not name,
@@ -10,6 +11,8 @@ use std::path::Path;
 const SPARE: u64 = 16 << 20;
 /// Size of the smallest node: its own pages, an output module, and one tool.
 const LEAST: u64 = 2 << 20;
+/// A clock that shows an earlier time was never set, ns since 1970: 2020.
+const NEVER_SET_NS: u64 = 1_577_836_800_000_000_000;
 /// Upper limit of our threads in a process of a node.
 const THREADS: u64 = 4;
 
@@ -18,6 +21,7 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     let mut found: Vec<Finding> = found.into_iter().flatten().collect();
     found.extend(groups_of_control(machine, needs));
     found.extend(nodes(machine));
+    found.extend(clocks(machine));
     found.extend(gui(machine, needs));
     found.push(systemd(machine));
     found
@@ -233,6 +237,29 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
         }
     };
     machine.asked.nodes.iter().map(finding).collect()
+}
+
+/// The computer's clock, and each node with another time.
+fn clocks(machine: &Machine) -> Vec<Finding> {
+    let what = "clock";
+    let why = "system time begins with it; certificates are checked by it";
+    let set = date(machine.asked.wall_ns);
+    let own = match machine.asked.wall_ns {
+        0..NEVER_SET_NS => Finding::not(
+            Grade::Warn,
+            what,
+            format!("{set}: it was not set since the computer was switched on"),
+            why,
+            "set it before launch: sudo date -s TIME, or sudo systemctl enable systemd-time-wait-sync (see boot.md)",
+        ),
+        _ => Finding::ok(what, set, why),
+    };
+    let why = "stamps, streams and recordings of the node go on in its system time";
+    let apart = machine.asked.nodes.iter().filter_map(|node| {
+        let is = format!("{}: {}", node.path.display(), clock_was_set(node.clock_set_by_ns?));
+        Some(Finding::not(Grade::Warn, "system time", is, why, "rohrpost time --new-epoch"))
+    });
+    std::iter::once(own).chain(apart).collect()
 }
 
 /// The streams of a node, behind what else is said of it.

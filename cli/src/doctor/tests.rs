@@ -41,6 +41,8 @@ fn compare(name: &str, said: &str) {
 
 /// A node directory of another user.
 const THEIRS: &str = "/home/robot/nodes/theirs.main";
+/// A clock that was set, ns since 1970.
+const SET_NS: u64 = 1_795_733_218_000_000_000;
 const PORTS: [&str; 3] = ["port of packages", "port of time", "port of the rest"];
 
 fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> LanView {
@@ -101,7 +103,8 @@ fn open() -> Protection {
 
 /// A node with so many streams of 68 MiB.
 fn node(path: &str, seen: NodeDirectory, number: usize) -> NodeFound {
-    NodeFound { path: path.into(), seen, streams: StreamsFound { number, bytes: number as u64 * (68 << 20) } }
+    let streams = StreamsFound { number, bytes: number as u64 * (68 << 20) };
+    NodeFound { path: path.into(), seen, streams, clock_set_by_ns: None }
 }
 
 fn good() -> (KernelFacts, Needs) {
@@ -114,6 +117,7 @@ fn good() -> (KernelFacts, Needs) {
         viewer: Some("/usr/local/bin/rerun".into()),
         lan: Some(lan_that_works()),
         protection: sealed(Ok(vec![2, 1]), Vec::new()),
+        wall_ns: SET_NS,
     };
     let from = Some("robot.toml".into());
     (asked, Needs { priority: 34, memory: 4 << 20, gui: true, bridge: None, processes: 6, from })
@@ -126,6 +130,10 @@ fn bad() -> (KernelFacts, Needs) {
         room: Some(Room { bytes: 64 << 20, free: 1 << 20 }),
         nodes: vec![
             node("/home/robot/nodes/demo.main", NodeDirectory::Dead, 1),
+            NodeFound {
+                clock_set_by_ns: Some(20_785 * 86_400_000_000_000),
+                ..node("/home/robot/nodes/slow.main", NodeDirectory::Launched(17), 0)
+            },
             node("/home/robot/nodes/old.main", NodeDirectory::OtherVersion(99), 0),
             node(THEIRS, NodeDirectory::Foreign(NodeError::Foreign(THEIRS.into(), 1001).to_string()), 0),
         ],
@@ -136,6 +144,7 @@ fn bad() -> (KernelFacts, Needs) {
             Err("keys/udp.keys: keys cannot be read (No such file or directory (os error 2))".into()),
             vec!["certificates/base.system-1.key: is missing; `rohrpost keys new` makes it".into()],
         ),
+        wall_ns: 61_000_000_000,
     };
     let from = Some("robot.toml".into());
     (asked, Needs { priority: 34, memory: 40 << 20, gui: true, bridge: None, processes: 6, from })
@@ -174,6 +183,7 @@ fn nothing_told() -> KernelFacts {
         viewer: None,
         lan: None,
         protection: Protection::default(),
+        wall_ns: SET_NS + 86_400_000_000_000,
     }
 }
 
@@ -234,7 +244,7 @@ fn each_line_is_tested_with_the_opposite_state() {
     // None of these is a problem: each describes a state, which differs between the computers.
     const NEVER_WRONG: [&str; 6] = ["fair server", "nice", "user", "container", "isolated cores", "systemd"];
     // These appear only for a problem.
-    const NEVER_RIGHT: [&str; 2] = ["CPU quota", "real-time quota"];
+    const NEVER_RIGHT: [&str; 3] = ["CPU quota", "real-time quota", "system time"];
     let computers = [
         ("good", good()),
         ("bad", bad()),

@@ -1,7 +1,7 @@
 //! The state of system time, as a router publishes it.
 
 use rohrpost::interfaces::{ClockRole, ClockState};
-use rohrpost_mailbox::monotonic_ns;
+use rohrpost_mailbox::{monotonic_ns, realtime_ns};
 use rohrpost_routers::shell::Shell;
 use rohrpost_routers::shell::clock::ClockState as Shown;
 use rohrpost_routers::time::Role;
@@ -28,5 +28,6 @@ pub(super) fn of(shell: &Shell, clock: &Shown) -> ClockState {
         round_trip_ns: seen.delay_ns,
         exchanges: seen.exchanges,
         by_kernel: seen.by_kernel,
+        clock_set_by_ns: seen.record.clock_set_by(now_ns, realtime_ns()),
     }
 }

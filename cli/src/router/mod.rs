@@ -9,15 +9,18 @@ pub(crate) mod replicas;
 mod slots;
 
 use crate::terminal::Failure;
-use rohrpost::interfaces::{Router, RouterInterface};
+use rohrpost::interfaces::{ClockRole, NewEpochError, Router, RouterInterface};
 use rohrpost::{Context, Module, ModuleError, Start};
+use rohrpost_config::ClockSetPolicy;
 use rohrpost_mailbox::Latency;
+use rohrpost_modules::launch::clock_was_set;
 use rohrpost_modules::runtime::{exit, kept, run_started};
 use rohrpost_routers::impair;
 use rohrpost_routers::replication::ReplicaSettings;
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Parts, ReplicaParts, Shell};
+use rohrpost_routers::time::Role;
 use serde::Deserialize;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -54,7 +57,18 @@ struct RouterModule {
     delays: Vec<Latency>,
 }
 
-impl Router for RouterModule {}
+impl Router for RouterModule {
+    fn new_epoch(&mut self) -> Result<u64, NewEpochError> {
+        let clock = self.shell.clock().ok_or(NewEpochError::NotMaster)?;
+        let seen = clock.snapshot();
+        if seen.role != Role::Master {
+            return Err(NewEpochError::NotMaster);
+        }
+        clock.ask_new_epoch();
+        tracing::warn!("a new epoch of time begins at this computer's clock, as asked");
+        Ok(seen.record.epoch)
+    }
+}
 
 impl Module for RouterModule {
     type Settings = NoSettings;
@@ -102,7 +116,16 @@ impl Module for RouterModule {
         assert!(self.shell.is_well(), "a thread of the router has ended");
         context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
         if let Some(clock) = self.shell.clock() {
-            context.publish_now(RouterInterface::CLOCK, &clock::of(&self.shell, clock))?;
+            let state = clock::of(&self.shell, clock);
+            context.publish_now(RouterInterface::CLOCK, &state)?;
+            let follows = context.installation().when_set == ClockSetPolicy::NewEpoch;
+            if let Some(by_ns) = state.clock_set_by_ns
+                && follows
+                && state.role == ClockRole::Master
+                && clock.ask_new_epoch()
+            {
+                tracing::warn!("{}: a new epoch of time begins at it", clock_was_set(by_ns));
+            }
         }
         if let Some(slots) = self.shell.slots() {
             context.publish_now(RouterInterface::SLOTS, &slots::of(&self.shell, slots))?;

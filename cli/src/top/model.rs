@@ -50,6 +50,9 @@ pub(super) struct TimeNow {
     pub(super) time_pace: f64,
     /// Whether its source has told it: a log that has not begun has not.
     pub(super) time_known: bool,
+    /// How far the computer's clock was set away from it, ns; positive: it is ahead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) clock_set_by_ns: Option<i64>,
 }
 
 /// Everything that is shown.

@@ -7,7 +7,7 @@ use super::model::{Sample, TimeNow};
 use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::survey::{Scope, Standing, Survey};
-use rohrpost_mailbox::SystemClock;
+use rohrpost_mailbox::{SystemClock, monotonic_ns, realtime_ns};
 use std::collections::HashMap;
 
 /// Why modules are in error, as they reported.
@@ -52,6 +52,7 @@ pub(super) fn put_together(
         time_source: record.map_or("local", |record| record.source.name()),
         time_pace: record.map_or(1.0, |record| record.pace_ppb as f64 / 1e9),
         time_known: record.is_none_or(|record| record.is_known()),
+        clock_set_by_ns: record.and_then(|record| record.clock_set_by(monotonic_ns(), realtime_ns())),
     };
     let launched = running.node.launcher().is_some();
     Sample { survey, silent, lines, time, launched }

@@ -1,16 +1,11 @@
 //! Texts of the screen: dates, long lines, the help.
 
 use super::super::table;
+use super::super::units::date;
 use super::columns::{Column, short};
 use super::model::{Model, TimeNow};
+use rohrpost::launch::clock_was_set;
 use rohrpost::survey::Standing;
-use rohrpost_builtin::format::iso;
-
-/// A moment to the second, such as `2026-11-21 10:40:12 UTC`.
-pub(super) fn date(time_ns: u64) -> String {
-    let text = iso(time_ns).replace('T', " ");
-    format!("{} UTC", text.split('.').next().unwrap_or_default())
-}
 
 /// The whole output as plain text, for `--once`.
 pub(super) fn table(model: &Model) -> String {
@@ -30,10 +25,13 @@ pub(super) fn head(model: &Model) -> [String; 2] {
         1 => format!("{}.{}", model.installation, model.nodes[0]),
         several => format!("{}: {several} nodes", model.installation),
     };
-    let TimeNow { time_ns, time_source, time_pace, time_known } = model.time;
+    let TimeNow { time_ns, time_source, time_pace, time_known, clock_set_by_ns } = model.time;
     let date = if time_known { date(time_ns) } else { "no time yet".into() };
     let pace = if time_pace == 1.0 || !time_known { String::new() } else { format!(" x {time_pace}") };
     let mut first = vec![whole, date, format!("{time_source}{pace}")];
+    if let Some(by_ns) = clock_set_by_ns {
+        first.push(clock_was_set(by_ns).replace("this computer's clock is", "CLOCK"));
+    }
     if !model.launched {
         first.push("NOT LAUNCHED".into());
     }

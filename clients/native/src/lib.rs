@@ -32,7 +32,9 @@ pub use parameters::NativeParameter;
 pub use peers::Peer;
 pub use record::RecordRoom;
 pub use rohrpost_mailbox::base_directory;
-pub use rohrpost_mailbox::{Around, Interest, Missed, Name, Next, Ready, RecordInfo, RecordPlace, SystemTime, Watch};
+pub use rohrpost_mailbox::{
+    Around, Interest, Missed, Name, Next, Ready, RecordInfo, RecordPlace, Stamp, SystemTime, Watch,
+};
 pub use rohrpost_modules::call::{CallError, Fault};
 pub use rohrpost_modules::runtime::{Moment, Start, StartError, StayingBytes, exit, tell_exit};
 pub use rohrpost_modules::wire::append;

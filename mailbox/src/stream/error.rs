@@ -147,7 +147,7 @@ pub enum ReplicaError {
         /// The least that it may be.
         next: u64,
     },
-    /// There is no room for it beside what is begun: two records are, or readers hold all other frames.
+    /// There is no room for it beside what is begun: as many records as may be are, or readers hold all other frames.
     #[error("stream {0}: there is no room for a record beside those that are begun; finish or give up one")]
     Begun(StreamId),
     /// As for any stream.

@@ -6,9 +6,10 @@
 //!   └──────────── give up: nobody saw it
 //! ```
 //!
-//! Two records are begun at a time at most: an older one of which something is missing, and a newer one that arrives.
-//! Each is filled in a frame of its own. A ring has one frame to spare, so the second is one that no reader holds at
-//! present; if readers hold them all, the caller gives up the older.
+//! Several records are begun at a time ([`StreamShape::begun_max`]): older ones of which something is missing, and
+//! newer ones that arrive. Small ones are filled in drafts; of others there are two at most, each in a frame of its
+//! own. A ring has one frame to spare, so the second is one that no reader holds at present; if readers hold them all,
+//! the caller gives up the older.
 
 use crate::about;
 use crate::name::Name;
@@ -22,9 +23,6 @@ use crate::stream::writer::StreamWriter;
 use crate::stream::writing::Frame;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Records that are begun at a time, at most.
-const BEGUN_MAX: usize = 2;
 
 /// What is said of a record at its origin.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -63,9 +61,9 @@ pub struct OriginRecord {
 /// ```
 pub struct ReplicaWriter {
     writer: StreamWriter,
-    begun: [Option<BegunRecord>; BEGUN_MAX],
+    begun: Box<[Option<BegunRecord>]>,
     /// Where records are filled that may be copied while they are written, one for each that is begun.
-    drafts: [Vec<u8>; BEGUN_MAX],
+    drafts: Box<[Vec<u8>]>,
 }
 
 struct BegunRecord {
@@ -105,8 +103,9 @@ impl Participant {
             return Err(StreamError::Shape(id, StreamShapeError::Keep(shape.keep)));
         }
         let writer = self.obtain_stream(id, shape, Some(first.min(SEQUENCE_MAX)), patience)?;
-        let drafts = [writer.draft.clone(), writer.draft.clone()];
-        Ok(ReplicaWriter { writer, begun: [None, None], drafts })
+        let places = 0..shape.begun_max();
+        let (begun, drafts) = places.map(|_| (None, writer.draft.clone())).unzip::<_, _, Vec<_>, Vec<_>>();
+        Ok(ReplicaWriter { writer, begun: begun.into(), drafts: drafts.into() })
     }
 
     /// Lays the description of a module of another node into this one's directory, as its owner does there
@@ -140,7 +139,7 @@ impl ReplicaWriter {
         self.begun.iter().flatten().map(|begun| begun.record).find(|record| record.sequence == sequence)
     }
 
-    /// Begins a record, beside one that may be begun already.
+    /// Begins a record, beside those that are begun already.
     ///
     /// # Errors
     /// See [`ReplicaError`]. Then none is begun, and what was begun before stays so.
@@ -174,7 +173,7 @@ impl ReplicaWriter {
         true
     }
 
-    /// Makes a record that is begun the newest one; an older one that is begun is given up. Each byte must have been
+    /// Makes a record that is begun the newest one; older ones that are begun are given up. Each byte must have been
     /// put: the rest is what an earlier record left there. Of the sequences between the newest before and this one the
     /// last `sampled` were left out on purpose, as far as there are so many; readers are told the others as lost.
     ///
@@ -200,14 +199,20 @@ impl ReplicaWriter {
         writer.progress.skip_to(&writer.segment.ring(), sequence, sampled);
         writer.incarnation = record.incarnation;
         writer.publish(frame, record.stamp, record.len_bytes);
-        let older = self.begun.iter().flatten().map(|begun| begun.record.sequence).find(|older| *older < sequence);
-        older.into_iter().for_each(|older| self.give_up(older));
+        for at in 0..self.begun.len() {
+            let older = self.begun[at].take_if(|begun| begun.record.sequence < sequence);
+            self.give_back(older);
+        }
         Ok(())
     }
 
     /// Gives up a record that is begun.
     pub fn give_up(&mut self, sequence: u64) {
         let begun = self.at(sequence).and_then(|at| self.begun[at].take());
+        self.give_back(begun);
+    }
+
+    fn give_back(&mut self, begun: Option<BegunRecord>) {
         if let Some(frame) = begun.and_then(|begun| begun.frame) {
             self.writer.progress.give_back(frame);
         }

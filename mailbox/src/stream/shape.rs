@@ -28,6 +28,9 @@ pub const STREAM_KEEP_MAX: u32 = (FRAMES_MAX - STREAM_READERS_MAX - 1) as u32;
 /// Records up to this size are copied with atomics, and may be read while the writer goes on. Larger ones are held
 /// while they are copied: an atomic copy moves eight bytes at a time.
 pub(crate) const RACING_BYTES_MAX: usize = 4096;
+/// Records of a replica that may be begun at a time, by [`StreamShape::begun_max`].
+const BEGUN_MIN: usize = 2;
+const BEGUN_MAX: usize = 8;
 /// Frames of more bytes than this in all are not brought in when they are mapped: each page comes when it is touched.
 const PRESENT_BYTES_MAX: usize = 1 << 20;
 
@@ -131,6 +134,20 @@ impl StreamShape {
     /// Whether its records are copied while the writer goes on.
     pub(crate) fn is_racing(&self) -> bool {
         self.record_bytes as usize <= RACING_BYTES_MAX
+    }
+
+    /// How many records of a replica of this shape may be begun at a time. Small ones overtake each other where the
+    /// delay of the network varies; they are filled beside the ring, and all that are whole fit into it at once.
+    ///
+    /// ```
+    /// use rohrpost_mailbox::StreamShape;
+    ///
+    /// let poses = StreamShape { record_bytes: 64, keep: 256, ..StreamShape::default() };
+    /// let pictures = StreamShape { record_bytes: 1 << 20, ..poses };
+    /// assert_eq!((poses.begun_max(), pictures.begun_max()), (8, 2));
+    /// ```
+    pub fn begun_max(&self) -> usize {
+        if self.is_racing() { (self.keep as usize).clamp(BEGUN_MIN, BEGUN_MAX) } else { BEGUN_MIN }
     }
 
     /// Whether all its frames are brought in at once.

@@ -49,6 +49,16 @@ impl TimeKeeper {
         Ok(keeper)
     }
 
+    /// Begins the next epoch at this system time, ahead or back, from the same source and at the same pace. Returns its
+    /// number; none if nobody wrote the page yet.
+    pub fn begin_epoch(&mut self, system_ns: u64) -> Option<u64> {
+        let last = self.record()?;
+        let epoch = last.epoch.saturating_add(1);
+        // In another epoch time may go back, so it is written.
+        self.write(&TimeRecord { epoch, monotonic_ns: monotonic_ns(), system_ns, ..last });
+        Some(epoch)
+    }
+
     /// Opens the page of a node that is to have the master's time. What it has of it stays. Else there is the wall
     /// clock, with a bound that says that nobody knows, until the node's router has heard a master.
     ///

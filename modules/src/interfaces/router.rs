@@ -230,6 +230,17 @@ pub struct ClockState {
     pub exchanges: u64,
     /// Whether the kernel stamps the frames; else they are stamped by the router, and the error is larger.
     pub by_kernel: bool,
+    /// How far the clock of its computer was set away from system time, ns; positive: it is ahead; none: they lie less
+    /// than a day apart.
+    pub clock_set_by_ns: Option<i64>,
+}
+
+/// Why a router begins no new epoch.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema, thiserror::Error)]
+pub enum NewEpochError {
+    /// Its node is not the master of time.
+    #[error("its node is not the master of time; `rohrpost time` shows which is")]
+    NotMaster,
 }
 
 /// Declared flows that leave a node, in their order in the configuration. Counts are since its router began, and only
@@ -372,4 +383,9 @@ pub trait Router {
     /// What it carries of streams between nodes, where there are replicas.
     #[data(5)]
     fn replicas() -> ReplicaStates;
+
+    /// Begins a new epoch of the common time at the clock of the master's computer. Answers before it has begun: the
+    /// epoch that is to end.
+    #[command(16)]
+    fn new_epoch(&mut self) -> Result<u64, NewEpochError>;
 }

@@ -30,14 +30,17 @@ mod program;
 mod repeats;
 mod serve;
 mod start;
+mod time;
 
 pub use error::{LaunchError, NotStarted};
 pub use events::{Event, events};
 pub use leftovers::CONFIG_FILE;
 pub use orphans::reap_orphans;
+pub use time::clock_was_set;
 
+use crate::common::OutputLevel;
 use crate::launcher::{Known, Phase};
-use crate::output::Relay;
+use crate::output::{OutputProxy, Relay};
 use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
@@ -45,11 +48,8 @@ use end::LaunchShutdown;
 use events::Bell;
 use look::Looks;
 use program::Program;
-use rohrpost_config::{Installation, Module, Node as NodeConfig, Reach, TimeSource as ConfiguredTime};
-use rohrpost_mailbox::{
-    LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
-    wait_any,
-};
+use rohrpost_config::{Installation, Module, Node as NodeConfig};
+use rohrpost_mailbox::{LaunchLock, Name, Node, NodeError, node_directory, remove_base_if_empty, wait_any};
 use serve::{Counter, Orders};
 use start::UnderWay;
 use std::io::ErrorKind;
@@ -59,6 +59,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
+use time::NodeTime;
 
 /// Modules answer launch within this time.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -66,6 +67,8 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const LOOK_SWITCHING: Duration = Duration::from_millis(50);
 /// While all modules are being stopped, it is looked so often which one may be told next.
 const LOOK_ENDING: Duration = Duration::from_millis(20);
+/// It is looked so often whether the computer's clock was set.
+const LOOK_CLOCK: Duration = Duration::from_secs(1);
 /// By then no thread of launch's holds its place on the node any more.
 const LET_GO: Duration = Duration::from_secs(1);
 /// Notes that are kept for queries; the oldest go first.
@@ -91,7 +94,9 @@ pub struct Launch {
     known: Known,
     bell: Bell,
     lock: LaunchLock,
-    _time: TimeKeeper,
+    time: NodeTime,
+    /// What it says itself, in order with what it passes on of its modules.
+    output: Option<OutputProxy>,
     /// Events to show, oldest first.
     notes: Vec<String>,
 }
@@ -159,7 +164,7 @@ impl Launch {
         let (node, lock) = take_node(&node_directory(&installation.name, node_name), mode)?;
         let mut notes = leftovers::end(&node, &installation, node_name)?;
         notes.extend(missing.iter().map(ToString::to_string));
-        let time = begin_time(&node, &installation, node_name)?;
+        let time = NodeTime::begin(&node, &installation, node_name)?;
         leftovers::note_config(&node, &installation, node_name, resolved)?;
         let tool = ToolLink::join_as_launch(&installation, &node, node_name, PATIENCE)?;
         let counter = Counter::open(&tool.link, &installation).map_err(ClientError::from)?;
@@ -173,6 +178,7 @@ impl Launch {
                 Child::new(module, &installation, program, &relay, is_missing)
             })
             .collect();
+        let output = relay.voice(&installation, tool.link.me());
         // It holds launch's place on the node, which is to be given back if the start fails.
         drop(relay);
         let node_name = node_name.to_owned();
@@ -190,7 +196,8 @@ impl Launch {
             known,
             bell,
             lock,
-            _time: time,
+            time,
+            output,
             notes,
         };
         match launch.start_all() {
@@ -216,8 +223,8 @@ impl Launch {
         let now = Instant::now();
         self.known.write(&self.node, self.children.iter().map(|child| child.state(now)).collect());
         let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
-        let (looks, notes) = (&mut self.looks, &mut self.notes);
-        let orders = Orders { children, installation, node, node_name: &self.node_name, looks, notes, ending };
+        let (looks, notes, time) = (&mut self.looks, &mut self.notes, &mut self.time);
+        let orders = Orders { children, installation, node, node_name: &self.node_name, looks, notes, time, ending };
         self.counter.serve(orders, &mut self.tool.link);
     }
 
@@ -236,6 +243,15 @@ impl Launch {
         child.mailboxes_are_gone();
         let note = removed.err().map(|error| format!("mailboxes of {} are left: {error}", child.text()));
         self.note(note);
+    }
+
+    /// That the computer's clock was set is a line for the terminal and one for the collector of output.
+    fn look_at_clock(&mut self) {
+        let Some(news) = self.time.look() else { return };
+        if let Some(output) = &self.output {
+            output.say(OutputLevel::Warn, output.now_ns(), news.clone(), None);
+        }
+        self.note(Some(news));
     }
 
     fn note(&mut self, note: Option<String>) {
@@ -258,12 +274,13 @@ impl Launch {
 
     /// Watches for at most `period`, or until something happens; false when it is time to stop.
     pub fn watch(&mut self, period: Duration) -> bool {
-        self.sleep(0..self.children.len(), period);
+        self.sleep(0..self.children.len(), period.min(LOOK_CLOCK));
         for index in 0..self.children.len() {
             self.step(index);
             self.switch_on(index);
             self.ask_why(index);
         }
+        self.look_at_clock();
         self.serve(false);
         self.bell.words() == 0
     }
@@ -335,9 +352,9 @@ impl Launch {
             self.sleep(0..self.children.len(), LOOK_ENDING);
         }
         let participant = Arc::downgrade(self.tool.link.participant());
-        let Self { node, children, tool, counter, lock, _time, mut notes, .. } = self;
+        let Self { node, children, output, tool, counter, lock, time: _time, mut notes, .. } = self;
         // They hold a way to the collector.
-        drop(children);
+        drop((children, output));
         counter.close();
         tool.close();
         // A thread that passes on a last line holds it for a moment; it never waits.
@@ -380,21 +397,4 @@ fn passes(error: &NodeError) -> bool {
         NodeError::Io(_, error) => error.kind() == ErrorKind::NotFound,
         _ => false,
     }
-}
-
-fn begin_time(node: &Arc<Node>, installation: &Installation, name: &str) -> Result<TimeKeeper, NodeError> {
-    // Likewise the client of the TCP router, where that tells the time.
-    if installation.node(name).is_some_and(|node| node.reach == Reach::Tcp) {
-        return TimeKeeper::await_master(node);
-    }
-    let (source, pace) = match installation.time {
-        ConfiguredTime::Local => (TimeSource::Local, 1.0),
-        // The router writes the master's time into the page as soon as it knows it; until then nobody is without a
-        // time, launch itself included. Another launch must not begin another epoch: all nodes would have to.
-        ConfiguredTime::Master { .. } => return TimeKeeper::await_master(node),
-        ConfiguredTime::Simulation { speed } => (TimeSource::Simulation, speed),
-        // The module that plays the log tells its time; until then the node has none.
-        ConfiguredTime::Log => return TimeKeeper::await_source(node, TimeSource::Log),
-    };
-    TimeKeeper::begin(node, source, realtime_ns(), pace)
 }

@@ -2,6 +2,7 @@
 
 use super::child::{Child, Then};
 use super::look::{Looks, see};
+use super::time::NodeTime;
 use crate::call::{Fault, Link};
 use crate::common;
 use crate::interface::{Interface, Serve};
@@ -72,6 +73,8 @@ pub(super) struct Orders<'a> {
     pub(super) looks: &'a mut Looks,
     /// Events to show.
     pub(super) notes: &'a mut Vec<String>,
+    /// System time of the node.
+    pub(super) time: &'a mut NodeTime,
     /// Launch stops all.
     pub(super) ending: bool,
 }
@@ -188,6 +191,12 @@ impl Launcher for Orders<'_> {
 
     fn look(&mut self, what: SnapshotRequest, form: u32, bytes_max: u16) -> Result<LookPage, LookError> {
         self.looks.take(form, bytes_max, || see(what, self.node, self.installation, self.node_name))
+    }
+
+    fn new_epoch(&mut self) -> Result<u64, ControlError> {
+        let epoch = self.time.begin_epoch().ok_or(ControlError::OtherTime)?;
+        self.notes.push(format!("epoch {epoch} of time begins at this computer's clock, as asked"));
+        Ok(epoch)
     }
 
     fn look_on(&mut self, look: u32, from: u32, bytes_max: u16) -> Result<LookPage, LookError> {

@@ -184,6 +184,9 @@ impl ClockDriver {
 
     /// Lets others see how it stands.
     pub fn publish(&mut self, on: &mut impl TimePlatform) {
+        if let Some(wall_ns) = on.take_new_epoch() {
+            self.clock.begin_time(on.local_ns(), wall_ns);
+        }
         self.write_page(on);
         on.publish(&self.clock, self.counts);
     }

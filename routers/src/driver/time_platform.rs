@@ -69,6 +69,11 @@ pub trait TimePlatform {
     fn note_watched(&mut self, watched: &Watched);
     /// Lets others see how it stands; the page is written.
     fn publish(&mut self, clock: &Clock, counts: TimeCounts);
+    /// Whether a new epoch is asked for since the last look: the computer's clock at which it is to begin, ns since
+    /// 1970.
+    fn take_new_epoch(&mut self) -> Option<u64> {
+        None
+    }
     /// Something happened that is told, or that a simulation watches.
     fn happened(&mut self, clock: &Clock, event: TimeEvent<'_>);
 }

@@ -55,7 +55,7 @@ pub struct RecordPart<'a> {
     pub stamp_ns: u64,
     /// When it was written, system time of that epoch, ns; 0: nobody knows.
     pub written_ns: u64,
-    /// How far off that is at most, ns.
+    /// How far off that is at most, ns, without half of the round trip by which that clock was measured.
     pub error_ns: u32,
     /// How many sequences it is behind the record that was sent to the same node before; 0: none was, or this part is
     /// sent again.

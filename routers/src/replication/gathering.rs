@@ -95,6 +95,8 @@ pub(super) struct Gathering {
     was_asked: bool,
     /// It is time to ask.
     is_due: bool,
+    /// When all of it was here, ns; 0: it is not.
+    whole_ns: u64,
 }
 
 impl Gathering {
@@ -120,6 +122,7 @@ impl Gathering {
             in_vain: 0,
             was_asked: false,
             is_due: false,
+            whole_ns: 0,
         }
     }
 
@@ -149,15 +152,11 @@ impl Gathering {
         (self.parts, self.missing, self.expected) = (parts, parts, parts - 1);
         (self.came_ns, self.pace_ns, self.asked_ns, self.first_asked_ns) = (now_ns, 0, 0, 0);
         (self.reached, self.gap_ns, self.is_passed) = (0, 0, false);
-        (self.rounds, self.in_vain, self.was_asked, self.is_due) = (0, 0, false, false);
+        (self.rounds, self.in_vain, self.was_asked, self.is_due, self.whole_ns) = (0, 0, false, false, 0);
     }
 
     pub(super) fn close(&mut self) {
         self.is_open = false;
-    }
-
-    pub(super) fn is_open(&self) -> bool {
-        self.is_open
     }
 
     /// Whether it is open for this record.
@@ -173,6 +172,11 @@ impl Gathering {
     /// Whether all is here.
     pub(super) fn is_whole(&self) -> bool {
         self.is_open && self.missing == 0
+    }
+
+    /// Whether all of it has been here for so long.
+    pub(super) fn has_waited(&self, now_ns: u64, for_ns: u64) -> bool {
+        self.is_whole() && now_ns.saturating_sub(self.whole_ns) >= for_ns
     }
 
     /// Whether parts of it were asked for.
@@ -191,6 +195,9 @@ impl Gathering {
         let since_ns = now_ns.saturating_sub(self.came_ns);
         self.came[index / 64] |= 1 << (index % 64);
         self.missing -= 1;
+        if self.missing == 0 {
+            self.whole_ns = now_ns;
+        }
         self.is_due |= index == self.expected;
         if self.in_vain == 0 {
             self.pace_ns = (7 * self.pace_ns + since_ns) / 8;

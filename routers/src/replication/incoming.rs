@@ -1,37 +1,35 @@
-//! One replica of this node: its ring, and the two records that may be open at a time.
+//! One replica of this node: its ring, and the records that may be open at a time, oldest first.
 //!
 //! ```text
-//!  part ─▶ of an open record? ─┬─ yes ─────────────▶ put ─▶ whole: published, the older one first
-//!                              ├─ newer than both ─▶ the older is given up: incomplete; the newer is the older now, and
-//!                              │                     its missing parts are asked for; this one is opened
-//!                              └─ between, before ─▶ opened as the older one, or late, duplicate; or made anew
+//!  part ─▶ of an open record? ─┬─ yes ──────────────▶ put ─▶ whole: published, when nothing older is open
+//!                              ├─ newer than all ───▶ opened; what is missing of those before is asked for; if there
+//!                              │                      is no room, the oldest is given up: incomplete
+//!                              └─ between, before ──▶ opened in its place, or late, duplicate; or made anew
 //! ```
 //!
-//! A newer record that is whole waits for the older one as long as an answer takes: a pose is late by one round trip
-//! when the one before it was lost, and never by more. A record of which no part came is known by the next one, which
-//! says how far behind it is: so what the sender left out on purpose is never asked for.
+//! A newer record that is whole waits for older ones as long as an answer takes: a pose is late by one round trip when
+//! the one before it was lost or reordered, and never by more. A record of which no part came is known by the next one,
+//! which says how far behind it is: so what the sender left out on purpose is never asked for.
 
 mod due;
 mod ending;
+mod open;
 
+use super::alarms::{DelayAlarm, LossAlarm};
 use super::answer_time::{AnswerTime, Unanswered};
 use super::counts::{ReceivedReplica, ReplicaLoss};
-use super::delay::DelayAlarm;
 use super::description::{DescriptionAssembly, KnownOrigin};
-use super::gathering::{Arriving, Gathering, Life};
+use super::gathering::{Arriving, Life};
 use super::requests::OutgoingRequest;
 use super::settings::ReplicaSettings;
 use crate::frame::RecordPart;
+use open::OpenRecords;
 use rohrpost_mailbox::{
     OriginRecord, Participant, RecordInfo, ReplicaError, ReplicaWriter, STREAM_SEQUENCE_MAX, StreamId, SystemTime,
 };
 use rtrb::Producer;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Places of open records. There is an older one only beside a newer one.
-const OLDER: usize = 0;
-const NEWER: usize = 1;
 
 /// A ring that cannot be opened or made is tried again after this, ns. By a line the next one is not opened, and no
 /// other description taken, before that either: the thread that does it has other ends as well, and files are slow.
@@ -63,11 +61,9 @@ pub(super) struct IncomingReplica {
     life: Option<Life>,
     /// What its sender had sampled out before it, in that life, modulo 2^32; none: not known.
     sampled: Option<u32>,
-    open: [Gathering; 2],
+    open: OpenRecords,
     /// The newest record that was given up: what still comes of it, or of older ones, is late.
     given_up: Option<(Life, u64)>,
-    /// When the newer one was whole, ns.
-    whole_ns: u64,
     answer_time: AnswerTime,
     /// What was asked for of a record that was given up since: a part of it may still come.
     unanswered: Option<Unanswered>,
@@ -85,6 +81,7 @@ pub(super) struct IncomingReplica {
     /// What is wrong with it was told.
     told: bool,
     delays: DelayAlarm,
+    losses: LossAlarm,
 }
 
 impl IncomingReplica {
@@ -100,9 +97,8 @@ impl IncomingReplica {
             writer: None,
             life: None,
             sampled: None,
-            open: std::array::from_fn(|_| Gathering::new(replica, part_bytes)),
+            open: OpenRecords::new(replica, part_bytes),
             given_up: None,
-            whole_ns: 0,
             answer_time: AnswerTime::default(),
             unanswered: None,
             retry_ns: 0,
@@ -113,6 +109,7 @@ impl IncomingReplica {
             has_asked: false,
             told: false,
             delays: DelayAlarm::default(),
+            losses: LossAlarm::default(),
         }
     }
 
@@ -165,7 +162,9 @@ impl IncomingReplica {
 
     /// What is open is given up.
     pub(super) fn cut(&mut self) {
-        [OLDER, NEWER].into_iter().for_each(|at| self.give_up(at));
+        while !self.open.is_empty() {
+            self.give_up_oldest();
+        }
     }
 
     /// Takes a part.
@@ -192,48 +191,47 @@ impl IncomingReplica {
             return self.lose(ReplicaLoss::Late);
         }
         let arriving = Arriving::of(part);
-        let open = self.open.iter().position(|open| open.is_of(&arriving.record, life));
-        let opened = open.or_else(|| self.begin(now, known.id, life, (arriving, part.step)));
-        if let Some(at) = opened {
+        let is_of = |open: &OpenRecords| open.iter().position(|open| open.is_of(&arriving.record, life));
+        if is_of(&self.open).is_none() {
+            self.begin(now, known.id, life, (arriving, part.step));
+        }
+        if let Some(at) = is_of(&self.open) {
             self.put(now, at, offset, part.bytes);
         }
-        [OLDER, NEWER].into_iter().for_each(|at| self.ask_if_due(now.ns, at));
+        self.ask_if_due(now.ns);
     }
 
     /// Whether the stream was made anew since, as its router has said.
     pub(super) fn is_over(&self, life: Life) -> bool {
         let announced = self.announced.map(|(life, _)| life);
-        let open = self.open.iter().filter(|open| open.is_open()).map(|open| open.life);
+        let open = self.open.iter().map(|open| open.life);
         open.chain(announced).chain(self.life).any(|known| life.is_before(known))
     }
 
-    /// Opens a record, if it may still be published; at which place. `step`: see [`RecordPart::step`].
-    fn begin(&mut self, now: Now<'_>, id: StreamId, life: Life, (arriving, step): (Arriving, u32)) -> Option<usize> {
+    /// Opens a record, if it may still be published. `step`: see [`RecordPart::step`].
+    fn begin(&mut self, now: Now<'_>, id: StreamId, life: Life, (arriving, step): (Arriving, u32)) {
         let record = arriving.record;
-        let newer = &self.open[NEWER];
-        let is_behind = newer.is_open() && newer.life == life && record.sequence <= newer.sequence;
+        let newest_open = self.open.last().map(|open| (open.life, open.sequence));
+        let is_behind = newest_open.is_some_and(|(of, newest)| of == life && record.sequence <= newest);
         let (next, newest) = self.there(now, id);
         if record.sequence < next {
             if newest.is_some_and(|newest| arriving.is(&newest)) {
                 (self.life, self.sampled) = (Some(life), Some(arriving.sampled));
-                self.lose(ReplicaLoss::Duplicate);
-                return None;
+                return self.lose(ReplicaLoss::Duplicate);
             }
             if is_behind || !self.is_anew(life, record.sequence, next) {
                 return self.late(now.ns, life, record.sequence);
             }
         }
         if is_behind {
-            return self.begin_older(now, id, life, arriving);
+            return self.begin_older(now, id, life, (arriving, step));
         }
-        if self.open[NEWER].is_open() {
-            if self.open[NEWER].life != life {
-                // What is open is of a time that has ended. By then the ring may be further.
-                self.settle(now);
-                return self.begin(now, id, life, (arriving, step));
-            }
-            self.make_room(now);
+        if newest_open.is_some_and(|(of, _)| of != life) {
+            // What is open is of a time that has ended. By then the ring may be further.
+            self.settle(now);
+            return self.begin(now, id, life, (arriving, step));
         }
+        self.make_room(now);
         if record.sequence < next {
             self.close_ring();
         }
@@ -241,13 +239,12 @@ impl IncomingReplica {
             if self.writer.is_none() {
                 self.retry_ns = now.ns + RETRY_NS;
             }
-            // The older one is behind nothing now.
+            // The older ones are behind nothing now.
             self.settle(now);
             return self.refuse(why);
         }
-        self.open[NEWER].open_seen(now.ns, arriving, life, self.part_bytes);
+        self.open.insert(record.sequence).open_seen(now.ns, arriving, life, self.part_bytes);
         self.expect_before(now.ns, life, record, step);
-        Some(NEWER)
     }
 
     /// What the ring has: the number of its next record, and its newest one.
@@ -281,73 +278,94 @@ impl IncomingReplica {
 
     /// The record that was sent before this one is waited for, if nothing of it has come.
     fn expect_before(&mut self, now_ns: u64, life: Life, record: OriginRecord, step: u32) {
-        let before = record.sequence.checked_sub(step.into()).filter(|_| step > 0);
-        let is_lost = |before: &u64| self.writer.as_ref().is_some_and(|writer| *before >= writer.next());
-        if let Some(before) = before.filter(is_lost)
-            && self.requests.is_some()
-            && !self.open[OLDER].is_open()
-        {
-            self.open[OLDER].open_unseen(now_ns, before, life);
+        let Some(before) = record.sequence.checked_sub(step.into()).filter(|_| step > 0) else { return };
+        let is_lost = self.writer.as_ref().is_some_and(|writer| before >= writer.next());
+        let is_known = self.open.iter().any(|open| open.sequence == before) || self.is_given_up(life, before);
+        if is_lost && !is_known && self.requests.is_some() && self.open.has_room() {
+            self.open.insert(before).open_unseen(now_ns, before, life);
         }
     }
 
-    /// Opens a record that is behind the one that arrives: it was asked for, or has come by a longer way.
-    fn begin_older(&mut self, now: Now<'_>, id: StreamId, life: Life, arriving: Arriving) -> Option<usize> {
-        let (record, older) = (arriving.record, &self.open[OLDER]);
-        let has_room = !older.is_open() || older.is_unseen(record.sequence, life);
-        let is_over = self.given_up.is_some_and(|(of, newest)| of == life && record.sequence <= newest);
-        if !has_room || is_over || record.sequence == self.open[NEWER].sequence || self.requests.is_none() {
+    /// Whether this record, or a newer one, was given up.
+    fn is_given_up(&self, life: Life, sequence: u64) -> bool {
+        self.given_up.is_some_and(|(of, newest)| of == life && sequence <= newest)
+    }
+
+    /// Opens a record that is behind one that is open: it was asked for, or has come by a longer way.
+    fn begin_older(&mut self, now: Now<'_>, id: StreamId, life: Life, (arriving, step): (Arriving, u32)) {
+        let record = arriving.record;
+        let unseen = self.open.iter().position(|open| open.is_unseen(record.sequence, life));
+        let is_new = unseen.is_none();
+        let is_other = is_new && self.open.iter().any(|open| open.sequence == record.sequence);
+        let has_place = !is_new || (self.open.has_room() && !self.is_given_up(life, record.sequence));
+        if is_other || !has_place || self.requests.is_none() {
             return self.late(now.ns, life, record.sequence);
         }
         if let Err(why) = self.write(now, id, record) {
             if why.is_none() {
                 // Readers hold all frames but one, so no answer can be taken: nothing waits for one.
-                self.give_up(OLDER);
-                self.publish_if_whole(now);
+                self.end_through(now, record.sequence);
             }
             return self.refuse(why);
         }
-        self.open[OLDER].open_seen(now.ns, arriving, life, self.part_bytes);
-        Some(OLDER)
+        // To write it, what is older may have been given up.
+        let unseen = self.open.iter_mut().find(|open| open.is_unseen(record.sequence, life));
+        let open = match unseen {
+            Some(open) => open,
+            None => self.open.insert(record.sequence),
+        };
+        open.open_seen(now.ns, arriving, life, self.part_bytes);
+        if is_new {
+            open.is_passed();
+        }
+        self.expect_before(now.ns, life, record, step);
     }
 
     /// The ring is opened anew for the next record; frames of open ones are its frames.
     fn close_ring(&mut self) {
-        self.give_up(OLDER);
+        self.cut();
         self.writer = None;
     }
 
     /// A record was not begun; why, if not for lack of room.
-    fn refuse(&mut self, why: Option<String>) -> Option<usize> {
+    fn refuse(&mut self, why: Option<String>) {
         self.lose(if why.is_some() { ReplicaLoss::Unwritable } else { ReplicaLoss::Late });
         why.into_iter().for_each(|why| self.tell(&why));
-        None
     }
 
     /// Begins a record in the ring, which is opened if it is not yet; or why that is not possible, with no writer if it
-    /// is not open. Without room beside the older one that is given up; none: there is no room for an older one.
+    /// is not open. Without room beside older ones these are given up; none: there is no room for an older one.
     fn write(&mut self, now: Now<'_>, id: StreamId, record: OriginRecord) -> Result<(), Option<String>> {
-        let mut writer = match self.writer.take() {
+        loop {
+            let writer = self.opened(now, id, record)?;
+            let why = match writer.begin(record) {
+                Ok(()) => return Ok(()),
+                Err(ReplicaError::Begun(_)) => None,
+                Err(why) => return Err(Some(why.to_string())),
+            };
+            if self.open.first().is_none_or(|oldest| oldest.sequence >= record.sequence) {
+                return Err(why);
+            }
+            self.give_up_oldest();
+            self.publish_before(now, record.sequence);
+        }
+    }
+
+    /// The writer of the ring.
+    fn opened(&mut self, now: Now<'_>, id: StreamId, record: OriginRecord) -> Result<&mut ReplicaWriter, String> {
+        let writer = match self.writer.take() {
             Some(writer) => writer,
             None if self.by_line && now.ns < self.open_ns => {
-                return Err(Some("its stream was made anew more than once a second".into()));
+                return Err("its stream was made anew more than once a second".into());
             }
             None => {
                 self.open_ns = now.ns.saturating_add(RETRY_NS);
                 let (shape, first) = (self.settings.shape, record.sequence);
                 let opened = now.participant.replica_writer_within(id, shape, first, self.patience());
-                opened.map_err(|error| Some(error.to_string()))?
+                opened.map_err(|error| error.to_string())?
             }
         };
-        let mut begun = writer.begin(record);
-        let older = &self.open[OLDER];
-        if matches!(begun, Err(ReplicaError::Begun(_))) && older.is_open() && older.sequence < record.sequence {
-            writer.give_up(older.sequence);
-            self.give_up(OLDER);
-            begun = writer.begin(record);
-        }
-        self.writer = Some(writer);
-        begun.map_err(|why| if matches!(why, ReplicaError::Begun(_)) { None } else { Some(why.to_string()) })
+        Ok(self.writer.insert(writer))
     }
 
     /// Whether a record that is not newer says that its stream was made anew.
@@ -371,14 +389,6 @@ impl IncomingReplica {
         if let Some((took_ns, requests)) = open.note(now.ns, index) {
             self.answer_time.answered(took_ns, requests);
         }
-        if !open.is_whole() {
-            return;
-        }
-        if at == NEWER && self.open[OLDER].is_open() {
-            self.whole_ns = now.ns;
-            return;
-        }
-        self.publish(now, at);
-        self.publish_if_whole(now);
+        self.publish_whole(now);
     }
 }

@@ -12,11 +12,11 @@
 //!
 //! Lost parts are asked for, within bounds on both ends:
 //!
-//! - The receiver has two records of a replica open at most: an older one that was asked for, and a newer one that
-//!   arrives. A third one, or the replica's deadline, ends the older one; a newer one that is whole waits for it as
-//!   long as an answer takes. Of a record of which nothing came it knows by the next one, since that says which was
-//!   sent before: what was left out on purpose is never asked for. This is worth it for small records, too: it costs
-//!   one request for a lost pose, and delays the next pose by one round trip.
+//! - The receiver has two records of a replica open at most, of small ones up to eight: older ones that were asked for
+//!   or reordered, and a newer one that arrives. One too many, or the replica's deadline, ends the oldest; a newer one
+//!   that is whole waits for older ones as long as an answer takes. Of a record of which nothing came it knows by the
+//!   next one, since that says which was sent before: what was left out on purpose is never asked for. This is worth it
+//!   for small records, too: it costs one request for a lost pose, and delays the next pose by one round trip.
 //! - It asks when the last part that is expected came, when a newer record begins, or when nothing came for the time
 //!   that an answer takes, measured; again after that time, then twice, then four times that time. At most 32 times for
 //!   a record after the last part of it that came by itself, and at most 500 requests a second for a replica.
@@ -30,16 +30,17 @@
 //! is none.
 
 mod again;
+mod alarms;
 mod answer_time;
 mod by_level;
 mod counts;
-mod delay;
 mod description;
 mod destination;
 mod fingerprint;
 mod gathering;
 mod incoming;
 mod line;
+mod one_way;
 mod outgoing;
 mod peers;
 mod receiving;
@@ -51,6 +52,7 @@ mod tests;
 
 pub use counts::{ReceivedReplica, ReplicaCounts, ReplicaLoss, ReplicaLosses, SentReplica};
 pub use line::{LineReplicas, TellsTime};
+pub use one_way::{MeasuredRoundTrip, OneWayClock};
 pub use receiving::ReplicaReceiver;
 pub use requests::PartRequests;
 pub use rohrpost_network::LINE_PART_BYTES;

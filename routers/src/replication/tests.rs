@@ -11,6 +11,7 @@ mod joining;
 mod lives;
 mod lossy;
 mod older;
+mod reordered;
 mod requests;
 mod sealed;
 mod slow;

@@ -22,11 +22,11 @@ use crate::counts::Cause;
 use crate::driver::{ReplicaDriver, ReplicaWait, RxDriver, part_queue};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
 use crate::impair;
-use crate::replication::{Describe, ReplicaCounts, ReplicaReceiver, ReplicaSender, ReplicaSettings};
+use crate::replication::{Describe, OneWayClock, ReplicaCounts, ReplicaReceiver, ReplicaSender, ReplicaSettings};
 use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
 use crate::security::{Gate, Port, Sealing};
 use crate::stats::Stats;
-use rohrpost_mailbox::{Head, Name, Node, Participant, SystemClock, monotonic_ns, wait_any};
+use rohrpost_mailbox::{Head, Name, Node, Participant, monotonic_ns, wait_any};
 use std::os::fd::OwnedFd;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -51,7 +51,7 @@ pub struct ReplicaParts<'a> {
 /// Writes parts that come.
 struct ReplicaDelivery {
     receiver: ReplicaReceiver,
-    clock: SystemClock,
+    clock: OneWayClock,
     /// The thread that sends, with the bell that wakes it; none: it is that of the time slots, which nobody wakes.
     sending: Option<Arc<Participant>>,
 }
@@ -97,7 +97,7 @@ struct ReplicaTx {
     driver: ReplicaDriver,
     sender: ReplicaSender,
     sending: Sending<NoPackages>,
-    clock: SystemClock,
+    clock: OneWayClock,
 }
 
 impl ReplicaTx {
@@ -173,15 +173,17 @@ impl Shell {
         }
         let stats = Stats::of_port(Port::Replicas, &settings, &self.stats);
         self.replica_stats = Some(stats.clone());
+        let round_trip = self.clock.as_ref().map(|clock| clock.round_trip().clone()).unwrap_or_default();
         let awaits = self.slot_parts.is_none().then(|| sending.clone());
-        let delivery = ReplicaDelivery { receiver, clock: SystemClock::open(node), sending: awaits };
+        let delivery =
+            ReplicaDelivery { receiver, clock: OneWayClock::open(node, round_trip.clone()), sending: awaits };
         self.receive_replicas(delivery, &stats, parts.socket)?;
         let before = (&self.stats, self.rest_stats.as_ref());
         let outbound = part_queue(&settings, &sender, stats, before, self.peer_sessions.as_ref());
         let sealing = self.peer_sessions.as_ref().map(|all| Sealing::new(all, Port::Replicas));
         let port = settings.network.replica_port();
         let wire = PeerSockets::new(&settings, port, sealing, parts.impair, &self.failures);
-        let (participant, describe, clock) = (sending, parts.describe, SystemClock::open(node));
+        let (participant, describe, clock) = (sending, parts.describe, OneWayClock::open(node, round_trip));
         let sending = Sending { outbound, answers: NoPackages, wire, rest: None };
         if let Some(slots) = self.slot_parts.take() {
             let sender = Arc::new(Mutex::new(sender));

@@ -1,8 +1,8 @@
 //! Replicas of one end of sessions: what it needs for them, and what it shows.
 
 use crate::counts::Count;
-use crate::replication::{Describe, LineReplicas, LineSettings, ReplicaCounts};
-use rohrpost_mailbox::{Node, Participant, SystemClock};
+use crate::replication::{Describe, LineReplicas, LineSettings, MeasuredRoundTrip, OneWayClock, ReplicaCounts};
+use rohrpost_mailbox::{Node, Participant};
 use std::sync::Arc;
 
 /// What an end needs for its replicas.
@@ -14,9 +14,14 @@ pub struct LineParts {
 }
 
 impl LineParts {
-    /// For the thread of a participant.
-    pub(super) fn start(self, node: &Arc<Node>, participant: Arc<Participant>) -> LineReplicas {
-        let clock = SystemClock::open(node);
+    /// For the thread of a participant. The clock of its node was measured by this round trip.
+    pub(super) fn start(
+        self,
+        node: &Arc<Node>,
+        participant: Arc<Participant>,
+        round_trip: MeasuredRoundTrip,
+    ) -> LineReplicas {
+        let clock = OneWayClock::open(node, round_trip);
         LineReplicas::new(&self.settings, participant, self.describe, Box::new(move |ns| clock.at(ns)))
     }
 }

@@ -10,6 +10,7 @@ import threading
 from dataclasses import replace
 
 import rohrpost as rp
+from rohrpost.node.streams import NoRecord
 
 
 @rp.data
@@ -37,6 +38,15 @@ def said(part) -> str:
         return f"no exception, but {part()!r}"
     except Exception as error:
         return f"{type(error).__name__}: {error}"
+
+
+def why(ask, *at) -> str:
+    """Why a stream has nothing at a time."""
+    try:
+        ask(*at)
+        return "there"
+    except NoRecord as error:
+        return error.why
 
 
 def locks(process="self") -> int:
@@ -167,9 +177,20 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
         for _ in range(2):
             with odometry.next(timeout_s=20) as record:
                 stamps.append((record.time_ns, record.value.pose.x_m))
+                epoch = record.epoch
         (before_ns, before_m), (after_ns, after_m) = stamps
         x_m = odometry.interpolated((before_ns + after_ns) // 2).pose.x_m
         told.append(f"half way: {abs(x_m - (before_m + after_m) / 2) < 1e-6}")
+        middle_ns, gap_ns = (before_ns + after_ns) // 2, after_ns - before_ns
+
+        def nearest(*at):
+            with odometry.at(*at):
+                pass
+
+        for longest_s in (None, (gap_ns - 1) / 1e9, gap_ns / 1e9):
+            odometry.with_gap(longest_s)
+            for ask in (odometry.around, nearest, odometry.interpolated):
+                told.append(f"{why(ask, middle_ns)}, {why(ask, middle_ns, epoch)}, {why(ask, middle_ns, epoch + 1)}")
         threading.Thread(target=lambda: told.append(said(lambda: camera.missed()))).run()
         for _ in range(12):
             # Of more than have a seat each is collected in another thread.

@@ -168,6 +168,7 @@ fn sample(installation: &Installation, at_ns: u64, counts: &[Counts]) -> Sample 
             time_source: "simulation",
             time_pace: 2.0,
             time_known: true,
+            clock_set_by_ns: None,
         },
         launched: true,
         silent: Vec::new(),

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::pyclass::PyVisit;
 use pyo3::types::PyBytes;
 use rohrpost_native::schema::Field;
-use rohrpost_native::{Around, Moment, Next, StayingBytes, StayingRecord};
+use rohrpost_native::{Around, Moment, Next, Stamp, StayingBytes, StayingRecord};
 use std::time::Duration;
 
 /// Sequence and stamp (ns) of a record.
@@ -88,14 +88,23 @@ impl Stream {
         self.find(py, |stream, _| Ok(stream.record(sequence)?.map(copied)))
     }
 
-    /// Sequence and stamp of the records around a time; or in words why there are none.
-    fn around(&self, py: Python<'_>, stamp_ns: u64) -> PyResult<(Option<[Mark; 2]>, &'static str)> {
-        Ok(match self.find(py, |stream, _| Ok(stream.around(Moment::Ns(stamp_ns))?))? {
-            Around::Records { before, after } => (Some([before, after].map(|info| (info.sequence, info.stamp.ns))), ""),
-            Around::Empty => (None, "empty"),
-            Around::BeforeOldest { .. } => (None, "before oldest"),
-            Around::NotYet { .. } => (None, "not yet"),
-            Around::OtherEpoch { .. } => (None, "other epoch"),
+    /// Sequence and stamp of the records around a time of this epoch, or of the present one; or in a word why there are
+    /// none, and how far it is off (ns), or the epoch that there is.
+    fn around(
+        &self,
+        py: Python<'_>,
+        stamp_ns: u64,
+        epoch: Option<u64>,
+    ) -> PyResult<(Option<[Mark; 2]>, &'static str, u64)> {
+        let at = epoch.map_or(Moment::Ns(stamp_ns), |epoch| Stamp { epoch, ns: stamp_ns }.into());
+        Ok(match self.find(py, |stream, _| Ok(stream.around(at)?))? {
+            Around::Records { before, after } => {
+                (Some([before, after].map(|info| (info.sequence, info.stamp.ns))), "", 0)
+            }
+            Around::Empty => (None, "empty", 0),
+            Around::BeforeOldest { by_ns } => (None, "before oldest", by_ns),
+            Around::NotYet { by_ns } => (None, "not yet", by_ns),
+            Around::OtherEpoch { newest } => (None, "other epoch", newest),
         })
     }
 

@@ -1,4 +1,4 @@
-//! Records of another node: in order, whole, two at a time, and what is not there is told.
+//! Records of another node: in order, whole, several at a time, and what is not there is told.
 
 use super::*;
 use crate::node::{Node, RegistryLock};
@@ -152,7 +152,7 @@ fn begin(replica: &mut ReplicaWriter, sequence: u64, ns: u64) -> Result<(), Repl
 }
 
 #[test]
-fn two_records_are_filled_at_once_and_finished_in_order() {
+fn records_are_filled_at_once_and_finished_in_order() {
     for shape in [SHAPE, LARGE] {
         let (_folder, participant, id) = ground();
         let mut replica = participant.replica_writer(id, shape, 0).unwrap();
@@ -162,7 +162,10 @@ fn two_records_are_filled_at_once_and_finished_in_order() {
             for sequence in [older, newer] {
                 begin(&mut replica, sequence, 100 + sequence).unwrap();
             }
-            assert!(matches!(begin(&mut replica, newer + 1, 900), Err(ReplicaError::Begun(_))), "a third");
+            let others = newer + 1..older + shape.begun_max() as u64;
+            others.clone().for_each(|other| begin(&mut replica, other, 900).unwrap());
+            assert!(matches!(begin(&mut replica, others.end, 900), Err(ReplicaError::Begun(_))), "one too many");
+            others.for_each(|other| replica.give_up(other));
             for half in [0, 4] {
                 for sequence in [newer, older] {
                     assert!(replica.put(sequence, half, &sequence.to_le_bytes()[half..half + 4]));
@@ -178,6 +181,21 @@ fn two_records_are_filled_at_once_and_finished_in_order() {
             let before = u64::from(older > 0);
             let expected = if older % 2 == 0 { (vec![older, newer], before) } else { (vec![newer], before + 1) };
             assert_eq!((all, lost), expected);
+        }
+    }
+}
+
+#[test]
+fn finishing_a_record_gives_up_all_older_ones() {
+    for shape in [SHAPE, LARGE] {
+        let (_folder, participant, id) = ground();
+        let mut replica = participant.replica_writer(id, shape, 0).unwrap();
+        let newest = shape.begun_max() as u64 - 1;
+        for _ in 0..2 {
+            let first = replica.next();
+            (first..=first + newest).for_each(|sequence| begin(&mut replica, sequence, 100 + sequence).unwrap());
+            replica.finish(first + newest, 0).unwrap();
+            assert!((first..=first + newest).all(|sequence| replica.begun(sequence).is_none()));
         }
     }
 }

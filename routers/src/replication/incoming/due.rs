@@ -1,33 +1,41 @@
 //! What is due with time: requests for parts that are missing, and the end of what nothing comes of any more.
 
+use super::super::gathering::Gathering;
 use super::super::requests::OutgoingRequest;
-use super::{IncomingReplica, NEWER, Now, OLDER};
+use super::{IncomingReplica, Now};
 use crate::frame::PartRequest;
 
 impl IncomingReplica {
     /// Does what is due with time. Says whether something is waited for.
     pub(in crate::replication) fn poll(&mut self, now: Now<'_>) -> bool {
-        let deadline_ns = self.settings.deadline_ns;
-        if self.open[OLDER].is_open() {
-            let holds_up = self.open[NEWER].is_whole() && now.ns.saturating_sub(self.whole_ns) >= self.answer_time.ns();
-            if holds_up || self.open[OLDER].is_given_up(now.ns, deadline_ns) {
-                self.give_up(OLDER);
-                self.publish_if_whole(now);
-            }
+        while self.open.len() > 1 && self.is_waited_for_no_more(now.ns) {
+            self.give_up_oldest();
+            self.publish_whole(now);
         }
-        [OLDER, NEWER].into_iter().for_each(|at| self.ask_if_due(now.ns, at));
+        self.ask_if_due(now.ns);
         self.waits(now.ns)
+    }
+
+    /// Whether the oldest record is given up: nothing came of it for long, or a newer one that is whole has waited for
+    /// as long as an answer takes.
+    fn is_waited_for_no_more(&self, now_ns: u64) -> bool {
+        let answer_ns = self.answer_time.ns();
+        let holds_up = self.open.iter().any(|open| open.has_waited(now_ns, answer_ns));
+        holds_up || self.open.first().is_some_and(|oldest| oldest.is_given_up(now_ns, self.settings.deadline_ns))
     }
 
     /// Whether something is due with time.
     pub(in crate::replication) fn waits(&self, now_ns: u64) -> bool {
-        let [older, newer] = &self.open;
-        let may_ask = newer.is_open() && !newer.is_given_up(now_ns, self.settings.deadline_ns);
-        self.requests.is_some() && (older.is_open() || may_ask)
+        let may_ask = |newest: &Gathering| !newest.is_given_up(now_ns, self.settings.deadline_ns);
+        self.requests.is_some() && (self.open.len() > 1 || self.open.last().is_some_and(may_ask))
     }
 
-    /// Asks for what is missing of an open record, if it is time.
-    pub(super) fn ask_if_due(&mut self, now_ns: u64, at: usize) {
+    /// Asks for what is missing of open records, the oldest first, if it is time.
+    pub(super) fn ask_if_due(&mut self, now_ns: u64) {
+        (0..self.open.len()).for_each(|at| self.ask_for(now_ns, at));
+    }
+
+    fn ask_for(&mut self, now_ns: u64, at: usize) {
         let (Some(requests), open) = (&mut self.requests, &mut self.open[at]) else { return };
         if !open.is_due(now_ns, (self.settings.deadline_ns, self.answer_time.ns())) {
             return;

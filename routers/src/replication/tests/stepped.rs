@@ -11,7 +11,13 @@ const EVERY_NS: u64 = 10 * MS;
 
 /// Counts lines of output.
 #[derive(Clone, Default)]
-struct Lines(Arc<AtomicU64>);
+pub(super) struct Lines(Arc<AtomicU64>);
+
+impl Lines {
+    pub(super) fn count(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
 
 impl Subscriber for Lines {
     fn enabled(&self, _: &Metadata<'_>) -> bool {
@@ -82,7 +88,7 @@ fn stepped(stepped: Stepped) -> (Vec<u64>, u64, u64) {
             assert_eq!(sequences.len(), before + 1, "record {step} is read as soon as it is written");
         }
     });
-    (sequences, lines.0.load(Ordering::Relaxed), holder.counts().delayed.get())
+    (sequences, lines.count(), holder.counts().delayed.get())
 }
 
 #[test]

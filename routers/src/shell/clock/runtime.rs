@@ -211,6 +211,10 @@ impl TimePlatform for TimeSystem {
         self.state.show(&ClockSnapshot { exchanges, by_kernel, ignored, real_time: self.real_time, ..seen });
     }
 
+    fn take_new_epoch(&mut self) -> Option<u64> {
+        self.state.take_new_epoch().then(realtime_ns)
+    }
+
     fn happened(&mut self, _: &Clock, event: TimeEvent<'_>) {
         match event {
             TimeEvent::Unsteady { why, is_new: true } => warn_unsteady(why),

@@ -1,8 +1,10 @@
 //! What a clock's thread lets others see.
 
 use crate::frame::NodeIndex;
+use crate::replication::MeasuredRoundTrip;
 use crate::time::{Clock, Reading, Role, Term};
 use rohrpost_mailbox::TimeRecord;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// System time on this node at one moment.
@@ -64,11 +66,18 @@ impl ClockSnapshot {
 #[derive(Debug)]
 pub struct ClockState {
     snapshot: Mutex<ClockSnapshot>,
+    /// Whether a new epoch is asked for.
+    new_epoch: AtomicBool,
+    round_trip: MeasuredRoundTrip,
 }
 
 impl ClockState {
     pub(super) fn new(snapshot: ClockSnapshot) -> Self {
-        Self { snapshot: Mutex::new(snapshot) }
+        Self {
+            snapshot: Mutex::new(snapshot),
+            new_epoch: AtomicBool::new(false),
+            round_trip: MeasuredRoundTrip::default(),
+        }
     }
 
     /// The present state. For tools: modules read the node's page.
@@ -76,8 +85,24 @@ impl ClockState {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The round trip by which this node's clock was measured.
+    pub fn round_trip(&self) -> &MeasuredRoundTrip {
+        &self.round_trip
+    }
+
+    /// Asks the clock's thread to begin a new epoch at this computer's clock; it does within a second if this node is
+    /// the master. False: that is asked already.
+    pub fn ask_new_epoch(&self) -> bool {
+        !self.new_epoch.swap(true, Ordering::Relaxed)
+    }
+
+    pub(super) fn take_new_epoch(&self) -> bool {
+        self.new_epoch.load(Ordering::Relaxed) && self.new_epoch.swap(false, Ordering::Relaxed)
+    }
+
     /// For the clock's thread. It never waits for a reader: then the next snapshot is shown.
     pub(super) fn show(&self, snapshot: &ClockSnapshot) {
+        self.round_trip.set(snapshot.delay_ns);
         if let Ok(mut shown) = self.snapshot.try_lock() {
             *shown = *snapshot;
         }

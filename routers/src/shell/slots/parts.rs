@@ -3,8 +3,8 @@
 use super::super::sending::{NoPackages, Sending};
 use crate::driver::{NotSent, Outlet, part_for_slot};
 use crate::frame::NodeIndex;
-use crate::replication::ReplicaSender;
-use rohrpost_mailbox::{SystemClock, monotonic_ns};
+use crate::replication::{OneWayClock, ReplicaSender};
+use rohrpost_mailbox::monotonic_ns;
 use std::sync::{Arc, Mutex};
 
 /// Streams of this node that others have, and the sockets to these.
@@ -12,7 +12,7 @@ pub(in crate::shell) struct SlotParts {
     /// Another thread looks for streams meanwhile: this one never waits for it.
     pub(in crate::shell) sender: Arc<Mutex<ReplicaSender>>,
     pub(in crate::shell) sending: Sending<NoPackages>,
-    pub(in crate::shell) clock: SystemClock,
+    pub(in crate::shell) clock: OneWayClock,
 }
 
 impl SlotParts {

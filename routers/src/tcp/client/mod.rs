@@ -20,6 +20,7 @@ use super::seal::ClientSeal;
 use super::snapshots::{Class, ClientLink, LatestValue, LinkState, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
 use crate::admission::capped;
+use crate::replication::MeasuredRoundTrip;
 use crate::session::client::{Client, ClientPackage, ClientStep};
 use crate::session::frame::{BadSessionFrame, Range};
 use crate::session::in_system;
@@ -55,6 +56,8 @@ pub struct ClientShell {
 
 #[derive(Debug, Default)]
 struct ClientShared {
+    /// By which the client measures the time of its node.
+    round_trip: MeasuredRoundTrip,
     ends: AtomicBool,
     seen: LatestValue<ClientLink>,
 }
@@ -81,7 +84,7 @@ impl ClientShell {
             SenderCache::here(&participant, &hosts),
             FaultWriter::new(faults, format!("beyond the TCP router at {server}")),
         );
-        reporter.line = replicas.map(|parts| parts.start(node, participant.clone()));
+        reporter.line = replicas.map(|parts| parts.start(node, participant.clone(), shared.round_trip.clone()));
         let counts = LineCounts::of(reporter.line.as_ref());
         let work = ClientThread {
             shared: shared.clone(),
@@ -348,6 +351,7 @@ impl ClientThread {
                 self.client.forget_time();
             }
             time.told(now_ns, self.client.system_time(now_ns), self.client.answers());
+            self.shared.round_trip.set(self.client.round_trip_ns());
         }
         let client = &self.client;
         let state = match (client.is_up(), client.is_connected()) {

@@ -14,6 +14,7 @@ use super::replicas::LineCounts;
 use super::seal::{Holder, ServerSeal};
 use super::snapshots::{Class, HOSTS_MAX, LatestValue, MEMBERS_MAX, MemberSnapshot, Members, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
+use crate::replication::MeasuredRoundTrip;
 use crate::session::server::{Names, Rights, Server, ServerStep, View};
 use crate::session::{Cause, ClientIndex};
 use accept::{listen, raise_descriptors};
@@ -80,7 +81,8 @@ impl ServerShell {
             let mut all = Watches::new(&participant).map_err(io("what wakes it"))?;
             all.add(&epoll.0, Interest::Read).map_err(io("what wakes it"))?;
             watches = Some(all);
-            host.line = Some(parts.start(node, participant));
+            // What its own router measures, that one alone knows.
+            host.line = Some(parts.start(node, participant, MeasuredRoundTrip::default()));
         }
         let counts = LineCounts::of(host.line.as_ref());
         let work = ServerThread {

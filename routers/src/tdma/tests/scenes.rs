@@ -246,3 +246,37 @@ fn in_quiet_times_frames_start_where_slots_do() {
     assert!(lead.1 >= 3 * US && lead.1 <= lead.0, "{lead:?}");
     holds(&world, 3);
 }
+
+/// The clock of the master's computer is set, from 1970 to now and back by an hour and a bit: windows stay where they
+/// are, whatever the new time is.
+#[test]
+fn nodes_never_meet_when_the_masters_clock_is_set_and_send_again_in_the_new_epoch() {
+    let years_ns = 56 * 365 * 86_400 * i128::from(SECOND);
+    for seed in seeds() {
+        let mut world = agreed(seed);
+        for by_ns in [years_ns + 3_333_333, -3_600 * i128::from(SECOND) - 1_234_567] {
+            let local_ns = world.nodes[0].local_ns(world.now);
+            let clock = world.nodes[0].clock.as_mut().unwrap();
+            let (epoch, now_ns) = (clock.record().epoch, clock.reading(local_ns).time.ns);
+            let wall_ns = u64::try_from(i128::from(now_ns) + by_ns).unwrap();
+            assert!(clock.begin_time(local_ns, wall_ns), "node 0 is the master");
+            let set_ns = clock.reading(local_ns).time.ns;
+            let off_ns = set_ns.abs_diff(now_ns) % CYCLE;
+            let is_whole = off_ns < US || CYCLE - off_ns < US;
+            assert!(set_ns.abs_diff(wall_ns) <= CYCLE && is_whole, "by whole cycles: {off_ns} ns");
+            world.run(CYCLE);
+            let follows = |world: &World| (0..3).all(|node| world.clock(node).record().epoch == epoch + 1);
+            assert!(
+                world.run_until(3 * SECOND, |world| follows(world) && world.agrees()),
+                "seed {seed}: {}",
+                tell(&world)
+            );
+            let before = world.counts(2).used;
+            world.run(SECOND);
+            assert!(world.counts(2).used > before + 50, "seed {seed}: {}", tell(&world));
+            let missed = |node| world.counts(node).skipped + world.counts(node).syncs.missed;
+            assert!((0..3).all(|node| missed(node) < 1_000), "no cycle passed in between: {}", tell(&world));
+        }
+        holds(&world, seed);
+    }
+}

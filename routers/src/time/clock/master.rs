@@ -104,6 +104,25 @@ impl Clock {
         }
     }
 
+    /// A new epoch begins at this computer's clock, which was set, and a term with it: to others it is another time, of
+    /// which they have measured nothing. In time slots it begins a whole number of cycles away, so that the windows
+    /// stay where others expect them. False: this node is not the master.
+    pub fn begin_time(&mut self, now_ns: u64, wall_ns: u64) -> bool {
+        if !matches!(self.election.state(), ElectionState::Master(_)) {
+            return false;
+        }
+        self.line.stop_slew(now_ns);
+        let own_ns = self.line.at(now_ns).ns;
+        let cycle_ns = if self.slots.is_some() { i128::from(self.interval_ns) } else { 1 };
+        let by_ns = (i128::from(wall_ns) - i128::from(own_ns)) / cycle_ns * cycle_ns;
+        let system_ns = u64::try_from(i128::from(own_ns) + by_ns).unwrap_or(own_ns);
+        let epoch = self.line.record().epoch.max(self.election.highest_epoch()).saturating_add(1);
+        let Some(term) = self.election.succeeds() else { return false };
+        self.line.step(now_ns, epoch, system_ns, self.line.record().pace_ppb, 0, 0);
+        self.become_master(now_ns, term, Origin::Own);
+        true
+    }
+
     pub(super) fn is_followed(&self, now_ns: u64) -> bool {
         self.slaves.iter().any(|slave| self.answers(slave, now_ns))
     }

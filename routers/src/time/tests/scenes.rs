@@ -9,7 +9,7 @@ const AGREED_NS: u64 = 3 * MS;
 
 type Scene = fn(&mut World);
 
-pub(super) const SCENES: [(&str, Scene); 9] = [
+pub(super) const SCENES: [(&str, Scene); 10] = [
     ("quiet", quiet),
     ("the master dies", the_master_dies),
     ("two masters die", two_masters_die),
@@ -19,6 +19,7 @@ pub(super) const SCENES: [(&str, Scene); 9] = [
     ("a long split", a_long_split),
     ("a node hears nobody", a_node_hears_nobody),
     ("nodes stand still", nodes_stand_still),
+    ("a clock is set", a_clock_is_set),
 ];
 
 /// A system of four that agrees; a third of the seeds have a bad network, a third a very uneven one.
@@ -162,5 +163,23 @@ fn nodes_stand_still(world: &mut World) {
         world.run(3 * SECOND + INTERVAL);
         world.run_until(2 * INTERVAL, "one master after a stand-still", |world| world.masters_now().len() == 1);
         agrees_again(world, 2 * SECOND);
+    }
+}
+
+/// From 1970 to now, by an hour back, and by nothing: each is one epoch, and all follow.
+fn a_clock_is_set(world: &mut World) {
+    let years_ns = 56 * 365 * 86_400 * SECOND;
+    for (epoch, by_ns) in [(2, -i128::from(years_ns)), (3, years_ns.into()), (4, -3_600 * i128::from(SECOND)), (5, 0)] {
+        let [master] = world.masters_now()[..] else { return world.fail("no master, or two") };
+        let now_ns = world.clock(master).reading(world.local_ns(master)).time.ns;
+        let wall_ns = u64::try_from(i128::from(now_ns) + by_ns).unwrap();
+        world.set_clock(master, wall_ns);
+        let begun_ns = world.clock(master).reading(world.local_ns(master)).time.ns;
+        assert!(begun_ns.abs_diff(wall_ns) < 1_000, "{}", world.replay);
+        agrees_again(world, 3 * SECOND);
+        world.run(15 * SECOND);
+        if (0..4).any(|node| world.epoch(node) != epoch) {
+            world.fail(&format!("each setting is one epoch: {epoch}"));
+        }
     }
 }

@@ -21,6 +21,15 @@ impl TermTime {
 }
 
 impl World {
+    /// The clock of the master's computer is set, and a new epoch begins at it.
+    pub(in crate::time::tests) fn set_clock(&mut self, node: NodeIndex, wall_ns: u64) {
+        let local_ns = self.local_ns(node);
+        let one = &mut self.nodes[usize::from(node)];
+        let Some(clock) = &mut one.clock else { return };
+        assert!(clock.begin_time(local_ns, wall_ns), "{}", self.replay);
+        self.check(node);
+    }
+
     /// Everything that must hold of a node at any moment.
     pub(super) fn check(&mut self, node: NodeIndex) {
         let (now, local_ns) = (self.now, self.local_ns(node));

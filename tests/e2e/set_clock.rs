@@ -1,0 +1,161 @@
+//! A computer that starts in 1970, as one without a battery does. Its clock is set while a node runs, and set back.
+
+use crate::harness::{NETWORK, OUTPUT, Place, Robot, probe, wait};
+use crate::lan::addresses;
+use crate::process::{Running, Said};
+use rohrpost_mailbox::{SystemClock, realtime_ns};
+use std::fs::OpenOptions;
+use std::io::{Seek, Write};
+use std::path::PathBuf;
+use std::process::Command;
+
+const DAY_S: i64 = 86_400;
+
+/// A computer with a clock that can be set.
+struct Computer {
+    place: Place,
+    library: PathBuf,
+}
+
+impl Computer {
+    /// It shows this time, s since 1970.
+    fn at(time_s: i64) -> Self {
+        let place = Place::new();
+        let library = place.path("set_clock.so");
+        let source = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/e2e/set_clock.c");
+        let compiler = Command::new("cc")
+            .args(["-shared", "-fPIC", "-O1", "-D_GNU_SOURCE", "-o"])
+            .arg(&library)
+            .arg(source)
+            .output();
+        let compiler = compiler.unwrap();
+        assert!(compiler.status.success(), "{}", String::from_utf8_lossy(&compiler.stderr));
+        let computer = Self { place, library };
+        computer.set(time_s - now_s());
+        computer
+    }
+
+    /// Sets its clock to so many seconds from the right time. Programs that run see the same file.
+    fn set(&self, by_s: i64) {
+        let mut file =
+            OpenOptions::new().write(true).create(true).truncate(false).open(self.place.path("clock")).unwrap();
+        file.rewind().unwrap();
+        file.write_all(&by_s.to_ne_bytes()).unwrap();
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = self.place.command(arguments);
+        command.env("LD_PRELOAD", &self.library).env("ROHRPOST_TEST_CLOCK", self.place.path("clock"));
+        command
+    }
+
+    fn say(&self, arguments: &[&str]) -> Said {
+        Running::start(self.command(arguments)).said()
+    }
+
+    /// Launches a node with a probe and the collector of output.
+    fn launched(&self, time: &str) -> (Running, Robot) {
+        let nodes = format!("[nodes.main]\n{time}");
+        let config = self.place.config_of("test", &nodes, &[OUTPUT, &probe("probe.0", "", "")]);
+        let mut launch = Running::start(self.command(&["launch", "--quiet", config.to_str().unwrap()]));
+        let robot = self.place.robot(&config, "main", &mut launch);
+        robot.wait_on(&mut launch);
+        (launch, robot)
+    }
+}
+
+fn now_s() -> i64 {
+    i64::try_from(realtime_ns() / 1_000_000_000).unwrap()
+}
+
+#[test]
+fn a_node_that_began_in_1970_says_so_when_the_clock_is_set_and_goes_on_when_it_is_told_to() {
+    let computer = Computer::at(60);
+    let (mut launch, robot) = computer.launched("");
+    let clock = SystemClock::open(&robot.node);
+    assert!(clock.now().ns < 3_600_000_000_000 && clock.now().epoch == 1, "{:?}", clock.now());
+    let quiet = computer.say(&["time"]).ok();
+    assert!(quiet.contains("own") && !quiet.contains("days"), "{quiet}");
+    computer.set(0);
+    let ahead = " days ahead of system time";
+    wait("launch says so", || launch.out().contains(ahead).then_some(()));
+    wait("the log says so", || computer.say(&["log"]).out.contains(ahead).then_some(()));
+    for arguments in [&["time"][..], &["top", "--once"], &["doctor"]] {
+        let said = computer.say(arguments).out;
+        assert!(said.contains(ahead), "{arguments:?}: {said}");
+    }
+    let json = computer.say(&["time", "--json"]).ok();
+    assert!(json.contains("\"clock_set_by_ns\":"), "{json}");
+    assert_eq!(clock.now().epoch, 1, "nothing changes unasked");
+    let begun = computer.say(&["time", "--new-epoch"]).ok();
+    assert!(begun.contains("epoch 2 of time: 20"), "{begun}");
+    let now = clock.now();
+    assert!(now.epoch == 2 && now.ns.abs_diff(realtime_ns()) < 60_000_000_000, "{now:?}");
+    for arguments in [&["time"][..], &["top", "--once"], &["doctor"]] {
+        let said = computer.say(arguments).out;
+        assert!(!said.contains(ahead), "{arguments:?}: {said}");
+    }
+    // Set back, as by a battery that is empty.
+    computer.set(-400 * DAY_S);
+    wait("launch says that it is behind", || launch.out().contains("400 days behind system time").then_some(()));
+    drop(robot);
+    launch.stop();
+    computer.place.assert_empty();
+}
+
+#[test]
+fn a_node_that_follows_its_clock_begins_an_epoch_when_that_is_set() {
+    let computer = Computer::at(60);
+    let (mut launch, robot) = computer.launched("[time]\nwhen-set = \"new-epoch\"\n");
+    let clock = SystemClock::open(&robot.node);
+    assert_eq!(clock.now().epoch, 1);
+    computer.set(0);
+    wait("the epoch", || (clock.now().epoch == 2).then_some(()));
+    assert!(clock.now().ns.abs_diff(realtime_ns()) < 60_000_000_000, "{:?}", clock.now());
+    drop(robot);
+    launch.stop();
+    computer.place.assert_empty();
+}
+
+/// Both nodes see the clock that is set; on whichever it is asked for, the master begins the epoch.
+#[test]
+fn nodes_follow_a_master_that_begins_an_epoch_when_it_is_asked_from_anywhere_or_by_itself() {
+    for when_set in ["tell", "new-epoch"] {
+        let computer = Computer::at(60);
+        let [base, arm] = addresses();
+        let nodes = format!(
+            "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n\
+             {NETWORK}when-set = \"{when_set}\"\n"
+        );
+        let output = OUTPUT.replacen("[[module]]\n", "[[module]]\nnode = \"arm\"\n", 1);
+        let config = computer.place.config_of("test", &nodes, &[&output]);
+        let mut launches = ["base", "arm"].map(|node| {
+            let file = config.to_str().unwrap();
+            let mut launch = Running::start(computer.command(&["launch", "--quiet", file, "--node", node]));
+            let robot = computer.place.robot(&config, node, &mut launch);
+            robot.wait_on(&mut launch);
+            (launch, robot)
+        });
+        let clocks = [0, 1].map(|node: usize| SystemClock::open(&launches[node].1.node));
+        let all_know = |in_1970: bool| {
+            let knows = |clock: &SystemClock| {
+                let is_known = clock.record().is_some_and(|record| record.is_known());
+                is_known && (clock.now().ns < 3_600_000_000_000) == in_1970
+            };
+            clocks.iter().all(knows).then(|| clocks.each_ref().map(|clock| clock.now().epoch))
+        };
+        let before = wait("both have the time of the master", || all_know(true));
+        computer.set(0);
+        if when_set == "tell" {
+            let ahead = || computer.say(&["time", "--config", config.to_str().unwrap()]).out.contains(" days ahead of");
+            wait("time says so", || ahead().then_some(()));
+            assert_eq!(all_know(true), Some(before), "nothing changes unasked");
+            let words = ["time", "--config", config.to_str().unwrap(), "--node", "arm", "--new-epoch"];
+            let begun = computer.say(&words).ok();
+            assert!(begun.contains(" of time: 20"), "{begun}");
+        }
+        let after = wait("both have the new time", || all_know(false));
+        assert!(after[0] == after[1] && after[0] > before[0], "{before:?}, then {after:?}");
+        launches.iter_mut().rev().for_each(|(launch, _)| drop(launch.stop()));
+    }
+}
