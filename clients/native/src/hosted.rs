@@ -58,14 +58,15 @@ fn state(interface: NativeInterface, settings: Settings, serves: Name) -> Result
     for (name, value) in settings {
         let value = serde_json::to_value(value)?;
         if parameters.has(&name) {
-            parameters.configure(&name, &serde_json::from_value::<Value>(value)?)?;
+            let configured = parameters.configure(&name, &serde_json::from_value::<Value>(value)?);
+            configured.map_err(|refusal| ModuleError::configuration(refusal.to_string()))?;
         } else if known.contains(&name) {
             others.insert(name, value);
         } else {
             let own = known.iter().map(String::as_str);
             let all: Vec<&str> = parameters.names().into_iter().chain(own).collect();
             let all = if all.is_empty() { "it has none".into() } else { format!("it has {}", all.join(", ")) };
-            return Err(ModuleError::new(format!("it has no setting `{name}`; {all}")));
+            return Err(ModuleError::configuration(format!("it has no setting `{name}`; {all}")));
         }
     }
     let settings = serde_json::Value::Object(others).to_string();

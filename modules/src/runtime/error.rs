@@ -2,9 +2,11 @@
 
 use super::stream::{RecordError, StreamReadError};
 use crate::journal::RunError;
+use crate::module::ModuleError;
 use crate::output::errno_of;
 use rohrpost_config::{Errors, NameTextError, SettingsError};
 use rohrpost_mailbox::{CreateError, NodeError};
+use std::error::Error;
 use std::path::PathBuf;
 
 /// Why a module did not start.
@@ -100,6 +102,8 @@ pub enum StartError {
         text: String,
         /// The number of the kernel's error, if one is behind it.
         errno: Option<u16>,
+        /// The configuration or the program is wrong.
+        is_configuration: bool,
     },
     /// The system said no.
     #[error("{0}: {1}")]
@@ -110,6 +114,12 @@ impl StartError {
     /// Exit code of a program that was configured wrongly (EX_CONFIG of sysexits.h): started again, it would end the
     /// same way.
     pub const CONFIGURATION: u8 = 78;
+
+    /// What a module says of itself while it is made.
+    pub(super) fn of_module(module: &str, error: &ModuleError) -> Self {
+        let (module, text) = (module.to_owned(), error.to_string());
+        Self::Module { module, text, errno: error.errno(), is_configuration: error.is_configuration() }
+    }
 
     /// The number of the kernel's error, if one is behind it.
     pub fn errno(&self) -> Option<u16> {
@@ -131,7 +141,8 @@ impl StartError {
             | Self::Endpoint(..)
             | Self::StandIn { .. }
             | Self::NoStream { .. }
-            | Self::Interface { .. } => Self::CONFIGURATION,
+            | Self::Interface { .. }
+            | Self::Module { is_configuration: true, .. } => Self::CONFIGURATION,
             Self::Node(_)
             | Self::Mailbox(..)
             | Self::Stream(_)
@@ -141,6 +152,14 @@ impl StartError {
             | Self::System(..) => 1,
         }
     }
+}
+
+/// Whether an error, or one behind it, says that the configuration is wrong.
+pub(crate) fn is_misconfigured(error: &(dyn Error + 'static)) -> bool {
+    std::iter::successors(Some(error), |error| (*error).source()).any(|error| {
+        let of_context = || error.downcast_ref::<ContextError>().is_some_and(ContextError::is_configuration);
+        error.is::<NameTextError>() || error.is::<SettingsError>() || of_context()
+    })
 }
 
 /// Why a module cannot speak to another.
@@ -223,4 +242,22 @@ pub enum ContextError {
         /// Its node; `?` beyond the LAN.
         node: String,
     },
+}
+
+impl ContextError {
+    /// Whether the configuration or the program is wrong, so that asking again does not help.
+    pub fn is_configuration(&self) -> bool {
+        match self {
+            Self::Name(_)
+            | Self::Class { .. }
+            | Self::NoMailbox(_)
+            | Self::NoName(_)
+            | Self::Undeclared { .. }
+            | Self::NotStoodIn { .. }
+            | Self::OtherTime
+            | Self::IsStream(_)
+            | Self::FarStream { .. } => true,
+            Self::TooMany | Self::Encode(..) | Self::Node(_) | Self::Record(_) | Self::Read(_) => false,
+        }
+    }
 }
