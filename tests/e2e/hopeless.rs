@@ -13,27 +13,25 @@ fn python(place: &Place, code: &str, keys: &str) -> String {
     format!("[[module]]\nname = \"pilot.0\"\nprogram = \"./hand.py\"\n{keys}\n")
 }
 
-/// A pilot with a motor that is none.
-fn with_wrong_class(keys: &str) -> String {
-    let settings = "settings = { laser = \"probe.0\", motor = \"probe.0\" }";
-    format!("[[module]]\nname = \"pilot.0\"\nbuiltin = \"pilot\"\n{settings}\n{keys}\n")
-}
-
 #[test]
 fn a_mistake_that_stays_is_told_once_and_not_tried_again() {
-    for (code, words) in [
-        (Some("def hold(:"), "SyntaxError: "),
-        (Some("import not_installed_anywhere"), "ModuleNotFoundError: No module named 'not_installed_anywhere'"),
-        (Some("from os import not_in_there"), "ImportError: cannot import name 'not_in_there'"),
-        (None, "`probe.0` is of class `probe`, but this speaks to class `"),
-    ] {
+    let keys = "required = false";
+    let missing = "[[module]]\nname = \"pilot.0\"\nprogram = [\"sh\", \"-c\", \"exec nowhere-installed\"]\n";
+    let of_python = |code: &'static str| move |place: &Place| python(place, code, keys);
+    let cases: [(Box<dyn Fn(&Place) -> String>, &str); 5] = [
+        (Box::new(of_python("def hold(:")), "SyntaxError: "),
+        (Box::new(of_python("import nowhere_installed")), "ModuleNotFoundError: No module named 'nowhere_installed'"),
+        (Box::new(of_python("from os import not_in_there")), "ImportError: cannot import name 'not_in_there'"),
+        (Box::new(|_| format!("{missing}{keys}\n")), "nowhere-installed: not found"),
+        (Box::new(|_| probe("probe.1", "hears = \"output.0\"", keys)), "`output.0` is of class `output`, but"),
+    ];
+    for (module, words) in cases {
         let place = Place::new();
-        let keys = "required = false";
-        let hopeless = code.map_or_else(|| with_wrong_class(keys), |code| python(&place, code, keys));
+        let hopeless = module(&place);
         let config = place.config(&[RECORDED_CLASSES, &hopeless, OUTPUT, &probe("probe.0", "", "")]);
         let mut launch = place.launch(&config);
         launch.wait_for("runs: ");
-        launch.wait_for("pilot.0 does not start; the others go on without it");
+        launch.wait_for(" does not start; the others go on without it");
         launch.signal(Signal::SIGINT);
         assert_eq!(launch.end().code(), Some(1), "it has failed for good");
         let told = launch.out();

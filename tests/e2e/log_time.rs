@@ -166,7 +166,8 @@ fn what_a_module_does_before_the_log_begins_is_recorded_and_repeated() {
     let more = "restart = \"always\"\n[[module]]\nname = \"mapper.0\"\nbuiltin = \"mapper\"\n\
                 calls = [\"laser.0\", \"odometry.0\"]\nsettings = { laser = \"laser.0\", odometry = \"odometry.0\" }\n\
                 [[module]]\nname = \"logd.0\"\nbuiltin = \"logd\"\nstop-within = \"60 s\"\n\
-                [record]\ndirectory = \"recordings\"\nexact = [\"mapper.0\"]\nleave-free = \"0 B\"\nflush = \"20 ms\"\n";
+                [record]\ndirectory = \"recordings\"\nexact = [\"mapper.0\"]\nleave-free = \"0 B\"\n\
+                flush = \"20 ms\"\n";
     let (mut launch, robot, _) = robot(&place, 10.0, &format!("start = \"off\"\n{more}"));
     // The recorder has found the mapper's journal long before the log begins.
     let mut tool = robot.tool(PATIENCE);

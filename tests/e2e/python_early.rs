@@ -1,5 +1,5 @@
-//! A module in Python whose streams are not written yet: it waits as one in Rust does, here and for another node. And
-//! what it prints and logs stands in one order.
+//! A module in Python that reads streams before they are written: it waits as one in Rust does, here and for another
+//! node. And what it prints and logs stands in one order.
 
 use crate::harness::{NETWORK, OUTPUT, Place, Robot, wait};
 use crate::lan::addresses;

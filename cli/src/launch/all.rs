@@ -119,8 +119,8 @@ pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
 }
 
 impl<'a> LaunchedNodes<'a> {
-    /// Starts the launch of each node; each shows what its modules say from the level `log` on. The calling thread must live as long as the nodes: the kernel takes its end for
-    /// this command's end.
+    /// Starts the launch of each node; each shows what its modules say from the level `log` on. The calling thread must
+    /// live as long as the nodes: the kernel takes its end for this command's end.
     ///
     /// # Errors
     /// When one cannot be started; then all are stopped.

@@ -2,7 +2,6 @@
 
 use super::stream::{RecordError, StreamReadError};
 use crate::journal::RunError;
-use crate::module::ModuleError;
 use crate::output::errno_of;
 use rohrpost_config::{Errors, NameTextError, SettingsError};
 use rohrpost_mailbox::{CreateError, NodeError};
@@ -114,12 +113,6 @@ impl StartError {
     /// Exit code of a program that was configured wrongly (EX_CONFIG of sysexits.h): started again, it would end the
     /// same way.
     pub const CONFIGURATION: u8 = 78;
-
-    /// What a module says of itself while it is made.
-    pub(super) fn of_module(module: &str, error: &ModuleError) -> Self {
-        let (module, text) = (module.to_owned(), error.to_string());
-        Self::Module { module, text, errno: error.errno(), is_configuration: error.is_configuration() }
-    }
 
     /// The number of the kernel's error, if one is behind it.
     pub fn errno(&self) -> Option<u16> {

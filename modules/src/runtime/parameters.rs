@@ -4,7 +4,6 @@ use super::context::Context;
 use super::error::StartError;
 use crate::common::{Change, PARAMETER_PAGE, ParameterPage, SetParameters};
 use crate::made::MadeModule;
-use crate::module::ModuleError;
 use crate::parameter::{Parameter, ParameterSet, Refusal, value_text};
 use rohrpost_config::Installation;
 
@@ -102,9 +101,13 @@ pub(crate) fn check_start<M: MadeModule>(
     }
     let Some(set) = set.as_mut() else { return Ok(()) };
     for (index, parameter) in (0..set.names().len()).filter_map(|index| Some((index, set.get(index)?))) {
-        let refused = |refusal| ModuleError::configuration(format!("its own default: {refusal}"));
-        let accepted = set.accept(index, &parameter.value).map_err(refused);
-        accepted.map_err(|error| StartError::of_module(text, &error))?;
+        let refused = |refusal| StartError::Module {
+            module: text.to_owned(),
+            text: format!("its own default: {refusal}"),
+            errno: None,
+            is_configuration: true,
+        };
+        set.accept(index, &parameter.value).map_err(refused)?;
     }
     Ok(())
 }
