@@ -23,7 +23,7 @@ fn a_mistake_that_stays_is_told_once_and_not_tried_again() {
         (Box::new(of_python("import nowhere_installed")), "ModuleNotFoundError: No module named 'nowhere_installed'"),
         (Box::new(of_python("from os import not_in_there")), "ImportError: cannot import name 'not_in_there'"),
         (Box::new(|_| format!("{missing}{keys}\n")), "nowhere-installed: not found"),
-        (Box::new(|_| probe("probe.1", "hears = \"output.0\"", keys)), "`output.0` is of class `output`, but"),
+        (Box::new(|_| probe("probe.1", "watches = \"output.0\"", keys)), "`output.0` is of class `output`, but"),
     ];
     for (module, words) in cases {
         let place = Place::new();
