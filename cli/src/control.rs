@@ -99,7 +99,10 @@ impl ModuleOrder<'_> {
                 return if wait { self.wait_stopped() } else { Ok(format!("{text} is being stopped")) };
             }
         };
-        let incarnation = incarnation.map_err(|error| self.told(&error))?;
+        let incarnation = incarnation.map_err(|error| match &error {
+            CallError::Module(_, ControlError::Running(_)) => self.runs_already(),
+            error => self.told(error),
+        })?;
         if wait { self.wait_running(incarnation, &before) } else { Ok(format!("{text} is being started")) }
     }
 
@@ -132,6 +135,30 @@ impl ModuleOrder<'_> {
         }
         let state = state.map_or("gone", ModuleState::name);
         Ok(format!("{text} runs and is {state} after {took_s:.2} s (process {pid}{before})"))
+    }
+
+    /// Why it is not started, as `rohrpost list` and a call of it have it.
+    fn runs_already(&mut self) -> Failure {
+        let (text, running) = (&self.text, self.running);
+        let survey = running.look(running.node_of(self.name), Scope::Module(self.name.raw())).ok();
+        let module = survey.as_ref().and_then(|survey| survey.module(self.name));
+        let state = module.and_then(|module| module.process.as_ref()?.state);
+        match state {
+            Some(ModuleState::Error) => {
+                let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
+                format!(
+                    "{text} runs, but is in error: {}; `rohrpost call {text} on` tries again, `rohrpost restart \
+                     {text}` starts it anew",
+                    plain::line(&why)
+                )
+            }
+            Some(ModuleState::Off) => {
+                format!("{text} runs already, and is off; `rohrpost call {text} on` switches it on")
+            }
+            Some(ModuleState::Starting) => format!("{text} is starting already"),
+            _ => ControlError::Running(text.clone()).to_string(),
+        }
+        .into()
     }
 
     fn wait_stopped(&mut self) -> Result<String, Failure> {

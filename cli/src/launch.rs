@@ -1,13 +1,16 @@
 //! `rohrpost launch`: runs the modules of a node, with a live table.
 
 mod all;
+mod log_lines;
 mod sockets;
 
+use super::call::level_of;
 use super::manager::Manager;
 use super::speech::Speech;
 use super::summary::{ModuleLine, module_lines, print_modules_live};
-use crate::terminal::{Failure, columns, folded};
+use crate::terminal::{Failure, columns, folded, rows};
 pub(super) use all::{LaunchedNodes, lab};
+use log_lines::LogLines;
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::launcher::Phase;
 use rohrpost::output::plain::Lines;
@@ -26,6 +29,7 @@ const REFRESH: Duration = Duration::from_millis(500);
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost launch config/demo.toml
+  rohrpost launch robot.toml --log=warn
   rohrpost launch robot.toml --node base
   rohrpost launch config/demo-nodes.toml --all --impair loss=5%,delay=2ms,reorder=5%
 Ctrl-C stops the modules in reverse order.")]
@@ -45,6 +49,10 @@ pub(super) struct Arguments {
     /// No live table, only events.
     #[arg(long)]
     quiet: bool,
+    /// Also show what the modules say, of this severity and above: error, warn, info, debug, trace. Below the live
+    /// table, or else on the standard error.
+    #[arg(long, value_name = "LEVEL", num_args = 0..=1, require_equals = true, default_missing_value = "info")]
+    log: Option<String>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -79,7 +87,7 @@ fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let lab = all::lab(&installation)?;
     let speech = Speech::begin()?;
     installation.security_texts().iter().for_each(|security| speech.say(security));
-    let mut nodes = LaunchedNodes::begin(installation, lab, arguments.impair, &speech)?;
+    let mut nodes = LaunchedNodes::begin(installation, lab, arguments.impair, arguments.log.as_deref(), &speech)?;
     while nodes.watch(Duration::MAX) {}
     let code = nodes.stop();
     speech.settle();
@@ -89,6 +97,8 @@ fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     let installation = load(arguments)?;
     let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
+    let least = arguments.log.as_deref().map(level_of).transpose()?;
+    let log = least.map(|least| LogLines::new(&installation, &node, least)).transpose()?;
     let mut manager = Manager::from_environment(|warning| speech.complain(warning));
     manager.starting(&node);
     let resolved = crate::resolved::of_node(&installation, &node);
@@ -96,7 +106,7 @@ fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     let mut launch =
         Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, &resolved, sockets)?;
     manager.ready(&launch);
-    let mut view = TerminalView::new(arguments.quiet, speech);
+    let mut view = TerminalView { log, ..TerminalView::new(arguments.quiet, speech) };
     view.began(&launch, &node);
     let mut shown = Ok(());
     while shown.is_ok() && launch.watch(view.wait().min(manager.wait())) {
@@ -130,15 +140,20 @@ pub(super) struct TerminalView<'a> {
     next: Instant,
     last: Option<Survey>,
     notes: Vec<String>,
+    /// What modules say, if that is wanted,
+    log: Option<LogLines>,
+    /// and the last of it, below the live table.
+    said: Vec<String>,
 }
 
-/// Notes that stay below the live table.
+/// Notes that stay below the live table, and likewise lines of modules.
 const NOTES_MAX: usize = 8;
 
 impl<'a> TerminalView<'a> {
     pub(super) fn new(quiet: bool, speech: &'a Speech) -> Self {
         let live = !quiet && std::io::stdout().is_terminal();
-        Self { speech, live, begun: Instant::now(), next: Instant::now(), last: None, notes: Vec::new() }
+        let now = Instant::now();
+        Self { speech, live, begun: now, next: now, last: None, notes: Vec::new(), log: None, said: Vec::new() }
     }
 
     /// All modules are on. Without a table, one line says so.
@@ -153,7 +168,8 @@ impl<'a> TerminalView<'a> {
 
     /// Time until the next drawing.
     pub(super) fn wait(&self) -> Duration {
-        self.next.saturating_duration_since(Instant::now()).max(Duration::from_millis(1))
+        let next = self.next.saturating_duration_since(Instant::now());
+        self.log.iter().map(LogLines::wait).fold(next, Duration::min).max(Duration::from_millis(1))
     }
 
     /// Shows the news, if it is time.
@@ -168,10 +184,13 @@ impl<'a> TerminalView<'a> {
         line: impl FnOnce(&Launch) -> Option<String>,
     ) -> Result<(), Failure> {
         let notes = launch.take_notes();
+        let said = self.log.as_mut().map(|log| log.take(launch)).unwrap_or_default();
         if !self.live {
             notes.iter().for_each(|note| self.speech.say(note));
+            said.iter().for_each(|line| self.speech.complain(line));
         }
-        self.notes.extend(notes);
+        keep_last(&mut self.notes, notes);
+        keep_last(&mut self.said, said);
         if Instant::now() < self.next {
             return Ok(());
         }
@@ -189,13 +208,16 @@ impl<'a> TerminalView<'a> {
 
     /// `line`: a whole line below the head, or nothing.
     fn draw(&mut self, installation: &str, line: &str, lines: &[ModuleLine]) {
-        let excess = self.notes.len().saturating_sub(NOTES_MAX);
-        self.notes.drain(..excess);
         let head = format!("{installation}, {} s. Ctrl-C stops it.", self.begun.elapsed().as_secs());
         // Home, then clear each line to its end, then everything below: no flicker. A line that is too long even so is
         // cut, so that the table keeps its shape.
         let notes = folded(&self.notes.join("\n"), columns());
-        let text = format!("{head}\n{line}\n{}\n{notes}\n", print_modules_live(lines));
+        let mut text = format!("{head}\n{line}\n{}\n{notes}\n", print_modules_live(lines));
+        // What finds no room would move the table.
+        let said = folded(&self.said.join("\n"), columns());
+        let room = rows().map_or(usize::MAX, |rows| rows.saturating_sub(text.lines().count() + 1));
+        let excess = said.lines().count().saturating_sub(room);
+        said.lines().skip(excess).for_each(|said| text += &format!("{said}\n"));
         let text = Lines(text).to_string().replace('\n', "\x1b[K\n");
         let first = if self.last.is_none() { "\x1b[2J" } else { "" };
         self.speech.draw(format!("{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J"));
@@ -208,4 +230,11 @@ impl<'a> TerminalView<'a> {
         }
         self.notes.clear();
     }
+}
+
+/// Adds to what is shown, and drops the oldest beyond what there is room for.
+fn keep_last(shown: &mut Vec<String>, news: Vec<String>) {
+    shown.extend(news);
+    let excess = shown.len().saturating_sub(NOTES_MAX);
+    shown.drain(..excess);
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use rohrpost::launch::{CONFIG_FILE, choose_node};
 use rohrpost::launcher::launcher_of;
 use rohrpost::output::plain;
-use rohrpost::survey::node_of;
+use rohrpost::survey::{Scope, Standing, node_of};
 use rohrpost::{Fault, ToolLink};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, NodeError, SendError, local, node_directory};
@@ -170,7 +170,11 @@ impl Running {
     /// The error for a module without mailboxes: why, and what to do.
     pub(super) fn absent(&self, module: Name) -> Failure {
         let name = self.text(module);
-        match self.installation.module(module) {
+        let known = self.installation.module(module);
+        if let Some(why) = known.and_then(|known| self.not_ready(known.name)) {
+            return format!("{name} {why}").into();
+        }
+        match known {
             Some(known) if known.node != self.node_name => {
                 format!(
                     "{name} does not run on node {0}; `rohrpost start {name}` starts it, or says why it cannot",
@@ -191,6 +195,25 @@ impl Running {
             ),
         }
         .into()
+    }
+
+    /// How it stands with a module that is on its way, or came to nothing: what `rohrpost list` says of it.
+    fn not_ready(&self, module: Name) -> Option<String> {
+        let survey = self.look(self.node_of(module), Scope::Module(module.raw())).ok()?;
+        let its = survey.module(module)?;
+        let (standing, name) = (its.standing(), self.text(module));
+        let error = || plain::line(&its.last_error(&self.installation)).into_owned();
+        match standing {
+            Standing::Starting => Some("is starting, and takes no commands yet".into()),
+            Standing::Restarting { .. } => Some(format!("is {standing}, since it ended: {}", error())),
+            Standing::Failed => Some(format!("has failed: {}; `rohrpost start {name}` tries it again", error())),
+            Standing::On
+            | Standing::Off
+            | Standing::Error
+            | Standing::Busy
+            | Standing::Stopped
+            | Standing::Unreachable => None,
+        }
     }
 
     /// An error about a module, with its name as users write it: the lower layers know only numbers.

@@ -32,6 +32,13 @@ pub(crate) fn columns() -> Option<usize> {
     Some(usize::from(width.0)).filter(|columns| *columns > 0)
 }
 
+/// Height of the terminal that reads the output, lines; as [`columns`].
+pub(crate) fn rows() -> Option<usize> {
+    let output = std::io::stdout();
+    let (_, height) = output.is_terminal().then(|| terminal_size::terminal_size_of(&output))??;
+    Some(usize::from(height.0)).filter(|rows| *rows > 0)
+}
+
 /// Prints prose: on a terminal, long lines are broken at blanks.
 pub(crate) fn say_folded(text: impl std::fmt::Display) -> bool {
     say(folded(&text.to_string(), columns()))

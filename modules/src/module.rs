@@ -5,7 +5,7 @@ use crate::call::Fault;
 use crate::interface::{Interfaces, StandIn, StandInCommand};
 use crate::output::errno_of;
 use crate::parameter::ParameterSet;
-use crate::runtime::{Context, Received};
+use crate::runtime::{Context, Received, is_misconfigured};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::Ready;
 use serde::de::DeserializeOwned;
@@ -58,7 +58,8 @@ pub trait Module: Sized {
     /// Makes the module, switched off. Subscribe here, and keep the proxies that you need.
     ///
     /// # Errors
-    /// Ends the process; launch says why and tries again as the restart policy has it.
+    /// Ends the process; launch says why and tries again as the restart policy has it; not if the configuration is at
+    /// fault ([`ModuleError::configuration`]).
     fn new(settings: Self::Settings, context: &mut Context) -> Result<Self, ModuleError>;
 
     /// Begins to work.
@@ -153,12 +154,29 @@ pub trait Module: Sized {
 pub struct ModuleError {
     text: String,
     errno: Option<u16>,
+    is_configuration: bool,
 }
 
 impl ModuleError {
     /// From words.
     pub fn new(text: impl Into<String>) -> Self {
-        Self { text: text.into(), errno: None }
+        Self { text: text.into(), errno: None, is_configuration: false }
+    }
+
+    /// The configuration, or the program itself, is wrong: started again, the module would fail in the same way. Of
+    /// [`Module::new`], launch tells it once and does not try again. Unknown names and wrong classes in settings are
+    /// such errors by themselves.
+    ///
+    /// ```
+    /// use rohrpost_modules::ModuleError;
+    ///
+    /// fn check(pins: &[u8]) -> Result<(), ModuleError> {
+    ///     if pins.len() == 4 { Ok(()) } else { Err(ModuleError::configuration("`pins` names 4 pins")) }
+    /// }
+    /// assert!(check(&[1]).unwrap_err().is_configuration());
+    /// ```
+    pub fn configuration(text: impl Into<String>) -> Self {
+        Self { is_configuration: true, ..Self::new(text) }
     }
 
     /// From an error, behind words that say where it happened.
@@ -172,8 +190,8 @@ impl ModuleError {
     /// assert_eq!(error.errno(), Some(2));
     /// ```
     pub fn at(place: impl fmt::Display, error: impl Into<Self>) -> Self {
-        let Self { text, errno } = error.into();
-        Self { text: format!("{place}: {text}"), errno }
+        let error = error.into();
+        Self { text: format!("{place}: {}", error.text), ..error }
     }
 
     /// The same with the number of the kernel's error that is behind it, where a language other than Rust tells it.
@@ -192,6 +210,11 @@ impl ModuleError {
     pub fn errno(&self) -> Option<u16> {
         self.errno
     }
+
+    /// Whether the configuration or the program is wrong, so that starting again does not help.
+    pub fn is_configuration(&self) -> bool {
+        self.is_configuration
+    }
 }
 
 impl fmt::Display for ModuleError {
@@ -209,7 +232,7 @@ impl fmt::Debug for ModuleError {
 // Like anyhow's: it is made from every error, so it cannot be one itself.
 impl<E: std::error::Error + 'static> From<E> for ModuleError {
     fn from(error: E) -> Self {
-        let errno = errno_of(&error);
+        let (errno, is_configuration) = (errno_of(&error), is_misconfigured(&error));
         let mut text = error.to_string();
         let mut source = error.source();
         while let Some(cause) = source {
@@ -219,6 +242,6 @@ impl<E: std::error::Error + 'static> From<E> for ModuleError {
             }
             source = cause.source();
         }
-        Self { text, errno }
+        Self { text, errno, is_configuration }
     }
 }

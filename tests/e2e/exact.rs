@@ -99,7 +99,7 @@ fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str
 }
 
 /// Messages of a journal in a file that is being written, if they are so.
-fn count(file: &Path, module: &str, is_so: impl Fn(&[u8]) -> bool) -> usize {
+pub(crate) fn count(file: &Path, module: &str, is_so: impl Fn(&[u8]) -> bool) -> usize {
     let topic = format!("{module}/journal");
     let Ok(mut reader) = rohrpost_recording::Reader::open(file) else { return 0 };
     let mut count = 0;

@@ -1,13 +1,15 @@
 //! A log as the time of a node: ticks come at the log's pace, none before it begins nor while it stands still, and from
-//! its beginning again when it is played anew.
+//! its beginning again when it is played anew. What modules do before it begins is in their journals.
 
+use crate::exact::count;
 use crate::harness::{PATIENCE, Place, Robot, probe, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use rohrpost::ToolLink;
 use rohrpost::common::GET_DATA;
 use rohrpost::wire::{append, from_bytes};
-use rohrpost_mailbox::{SystemClock, TimeSource, monotonic_ns};
+use rohrpost_mailbox::{StreamId, SystemClock, TimeSource, monotonic_ns};
+use rohrpost_modules::journal::JOURNAL_NUMBER;
 use std::path::PathBuf;
 
 /// When the log begins, s after 1970.
@@ -25,6 +27,8 @@ player = { id = 170 }
 odometry = { id = 160 }
 laser = { id = 150 }
 probe = { id = 96 }
+mapper = { id = 95 }
+logd = { id = 24 }
 tool = { id = 16 }
 [scheduling]
 real-time-from = 256
@@ -153,5 +157,39 @@ fn before_the_log_begins_there_is_no_time_and_tools_say_so() {
     assert!(top().contains("log x 2\n"), "{}", top());
     tool.close();
     launch.stop();
+    place.assert_empty();
+}
+
+#[test]
+fn what_a_module_does_before_the_log_begins_is_recorded_and_repeated() {
+    let place = Place::new();
+    let more = "restart = \"always\"\n[[module]]\nname = \"mapper.0\"\nbuiltin = \"mapper\"\n\
+                calls = [\"laser.0\", \"odometry.0\"]\nsettings = { laser = \"laser.0\", odometry = \"odometry.0\" }\n\
+                [[module]]\nname = \"logd.0\"\nbuiltin = \"logd\"\nstop-within = \"60 s\"\n\
+                [record]\ndirectory = \"recordings\"\nexact = [\"mapper.0\"]\nleave-free = \"0 B\"\n\
+                flush = \"20 ms\"\n";
+    let (mut launch, robot, _) = robot(&place, 10.0, &format!("start = \"off\"\n{more}"));
+    // The recorder has found the mapper's journal long before the log begins.
+    let mut tool = robot.tool(PATIENCE);
+    let journal = StreamId { name: robot.name("mapper.0"), number: JOURNAL_NUMBER };
+    let newest = || robot.node.inspect_stream(journal).unwrap()?.newest.map(|newest| newest.sequence);
+    for _ in 0..3 {
+        let before = newest();
+        for order in ["off", "on"] {
+            place.say(&["call", "mapper.0", order]).ok();
+        }
+        wait("the journal goes on", || newest().filter(|now| Some(*now) > before));
+        // It has had a turn since.
+        tool.status(robot.name("logd.0")).unwrap();
+    }
+    place.say(&["call", "player.0", "on"]).ok();
+    let file = place.path("recordings/main-0001.mcap");
+    wait("the journal is recorded", || (count(&file, "mapper.0", |_| true) > 0).then_some(()));
+    tool.close();
+    launch.stop();
+    let words = ["replay", "--exact", "--run-recorded", "--json", file.to_str().unwrap(), "mapper.0"];
+    let told = Running::start(place.command(&words)).said();
+    let run: serde_json::Value = serde_json::from_str(&told.out).unwrap_or_else(|_| panic!("{told:?}"));
+    assert_eq!((told.code, &run["result"]), (Some(0), &"identical".into()), "{told:?}");
     place.assert_empty();
 }

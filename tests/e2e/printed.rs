@@ -150,11 +150,44 @@ fn the_back_trace_of_a_panic_that_comes_again_and_again_is_told_once_with_the_ow
     assert_eq!(said.code, Some(1), "{said:?}");
     let all = said.out + &said.err;
     let count = |text: &str| all.lines().filter(|line| line.contains(text)).count();
-    assert!(count(&format!("panicked at {FILE}:")) >= 4, "each end says why: {all}");
+    assert_eq!(count(&format!("panicked at {FILE}:")), 2, "the first end says why, and so does the last: {all}");
+    assert_eq!(count("; as before"), 2, "{all}");
     let place_of_panic = all.lines().find_map(|line| line.split("panicked at ").nth(1)).unwrap();
     let traced = format!("/{}", place_of_panic.trim_end_matches(':'));
     assert_eq!(count(&traced), 1, "{traced} in {all}");
     for others in ["/rustc/", "modules/src/", "std::panicking"] {
         assert_eq!(count(others), 0, "{others}: {all}");
+    }
+}
+
+#[test]
+fn launch_shows_what_modules_say_if_it_is_asked_to() {
+    for (log, is_shown) in [("--log", true), ("--log=warn", false)] {
+        let place = Place::new();
+        let config = place.config(&[OUTPUT, &probe("probe.0", "", "")]);
+        let mut launch = Running::start(place.command(&["launch", config.to_str().unwrap(), log]));
+        let robot = place.robot(&config, "main", &mut launch);
+        robot.wait_on(&mut launch);
+        call(&place, &["probe.0", "print", "stdout", "a remark", "1"]);
+        call(&place, &["probe.0", "say", "error", "a complaint"]);
+        let shown = wait("it is shown", || Some(launch.err()).filter(|err| err.contains("probe.0: a complaint\n")));
+        assert_eq!(shown.contains(" info  main/probe.0: is on\n"), is_shown, "{log}: {shown}");
+        wait("what it printed", || (!is_shown || launch.err().contains("probe.0: a remark 0\n")).then_some(()));
+        launch.signal(Signal::SIGINT);
+        assert!(launch.end().success());
+        assert_eq!(
+            (launch.out().as_str(), launch.err().contains('\u{1b}')),
+            ("node main of test runs: 2 modules\n", false)
+        );
+    }
+}
+
+#[test]
+fn what_is_to_be_shown_needs_a_collector_and_a_level() {
+    let place = Place::new();
+    let config = place.config(&[&probe("probe.0", "", "")]);
+    for (log, told) in [("--log", "add a module with `builtin = \"output\"`"), ("--log=loud", "no level `loud`")] {
+        let said = place.say(&["launch", config.to_str().unwrap(), log]).fails();
+        assert!(said.contains(told), "{said}");
     }
 }

@@ -7,6 +7,7 @@ use nix::sys::signal::{SigHandler, Signal, raise, signal};
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError, Rate, Received, Subscription};
 use rohrpost_mailbox::{OverflowPolicy, Shape};
+use rohrpost_modules::runtime::{Start, run_started, tell_exit};
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -16,8 +17,8 @@ use std::time::Duration;
 #[test]
 fn module() {
     if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Probe>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
+        let ended = Start::from_environment().and_then(run_started::<Probe>);
+        std::process::exit(tell_exit(ended).into());
     }
 }
 

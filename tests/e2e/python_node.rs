@@ -244,7 +244,7 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
         "has no function `fly`; it has: drive, halt",
         "BadArguments: the arguments cannot be written: speed_m_s: expected a number (f64), got `fast`",
         "FunctionError: NotFinite",
-        "RohrpostError: ",
+        "Misconfigured: ",
         "Misuse: Remembered.grip: value: expected a number (f64), got `wide`",
         "Misuse: Remembered has no data `grab`; it has: grip",
         "but it is opened for {x_m: f64, y_m: f64, heading_rad: f64}",
@@ -364,8 +364,8 @@ fn by_hand_it_says_why_it_does_not_start_and_ends_by_control_c() {
     let named = ["--config", config.to_str().unwrap(), "--name", "gripper.0"];
     for (settings, arguments, code, told) in [
         ("mood = \"good\"", &named[..2], 2, "which module of it?"),
-        ("mod = \"good\"", &named[..], 1, "it has no setting `mod`; it has gain, mood"),
-        ("mood = \"good\", gain = 11", &named[..], 1, "`gain` is 11, out of range: at most 9"),
+        ("mod = \"good\"", &named[..], 78, "it has no setting `mod`; it has gain, mood"),
+        ("mood = \"good\", gain = 11", &named[..], 78, "`gain` is 11, out of range: at most 9"),
         ("", &named[..], 1, "KeyError: 'mood'"),
     ] {
         let settings = if settings.is_empty() { "gain = 1" } else { settings };

@@ -76,7 +76,7 @@ fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
     });
     let told = place.say(&["call", "probe.0", "count", "1"]).fails();
     assert!(
-        told.contains("probe.0 does not run; `rohrpost start probe.0` starts it"),
+        told.contains("probe.0 has failed: was killed by signal 9") && told.contains("`rohrpost start probe.0`"),
         "nothing waits for a module that never comes: {told}"
     );
     let status = place.say(&["status"]);

@@ -77,6 +77,22 @@ fn a_live_table_has_all_columns_and_all_names_in_eighty_columns() {
 }
 
 #[test]
+fn what_modules_say_stands_below_the_live_table_which_keeps_its_place() {
+    let place = Place::new();
+    let config = place.config(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (terminal, mut launch) = Terminal::start(&place, &["launch", config.to_str().unwrap(), "--log"], 10, COLUMNS);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    place.say(&["call", "probe.0", "print", "stdout", &"far too long ".repeat(20), "30"]).ok();
+    let is_last = |screen: &str| screen.split_whitespace().any(|word| word == "29");
+    let screen = terminal.wait_screen("the last line", is_last);
+    let first = screen.lines().next().unwrap_or_default();
+    assert!(first.starts_with("test, ") && screen.contains("probe.0"), "the table has moved:\n{screen}");
+    launch.signal(Signal::SIGINT);
+    assert!(launch.end().success());
+}
+
+#[test]
 fn every_tool_fits_a_terminal_of_eighty_columns() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[&simulated(), OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);

@@ -119,8 +119,8 @@ pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
 }
 
 impl<'a> LaunchedNodes<'a> {
-    /// Starts the launch of each node. The calling thread must live as long as the nodes: the kernel takes its end for
-    /// this command's end.
+    /// Starts the launch of each node; each shows what its modules say from the level `log` on. The calling thread must
+    /// live as long as the nodes: the kernel takes its end for this command's end.
     ///
     /// # Errors
     /// When one cannot be started; then all are stopped.
@@ -128,6 +128,7 @@ impl<'a> LaunchedNodes<'a> {
         installation: Arc<Installation>,
         lab: Lab,
         bad: Option<impair::ImpairmentSettings>,
+        log: Option<&str>,
         speech: &'a Speech,
     ) -> Result<Self, Failure> {
         let (sender, happenings) = sync_channel(LINES_MAX);
@@ -136,7 +137,7 @@ impl<'a> LaunchedNodes<'a> {
         let mut all =
             Self { installation, nodes: Vec::new(), happenings, open: 0, speech, words: 0, stopping: false, lab };
         for index in 0..all.installation.nodes.len() {
-            let started = all.start(index, &executable, bad, &sender);
+            let started = all.start(index, &executable, (bad, log), &sender);
             if let Err(error) = started {
                 all.stop();
                 return Err(error);
@@ -149,12 +150,13 @@ impl<'a> LaunchedNodes<'a> {
         &mut self,
         index: usize,
         executable: &Path,
-        bad: Option<impair::ImpairmentSettings>,
+        (bad, log): (Option<impair::ImpairmentSettings>, Option<&str>),
         sender: &SyncSender<NodeEvent>,
     ) -> Result<(), Failure> {
         let name = self.installation.nodes[index].name.clone();
         let mut command = Command::new(executable);
         command.arg("launch").arg(&self.installation.path).args(["--node", &name, "--quiet"]);
+        command.args(log.map(|level| format!("--log={level}")));
         command.env(WITHIN, std::process::id().to_string());
         if let Some(bad) = bad {
             command.env(impair::ENVIRONMENT, bad.to_string());

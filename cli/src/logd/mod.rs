@@ -195,7 +195,8 @@ impl Logd {
 
     fn find(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let Some(writer) = &mut self.writer else { return Ok(()) };
-        self.taps.find(context, writer)
+        let has_begun = has_begun(context.clock());
+        self.taps.find(context, writer, has_begun)
     }
 
     /// Obeys what connections say, as far as it goes without waiting.

@@ -120,8 +120,14 @@ impl Taps {
         }
     }
 
-    /// Subscribes to what modules offer that run by now. Nobody is waited for.
-    pub(super) fn find(&mut self, context: &mut Context, writer: &mut Writer) -> Result<(), ModuleError> {
+    /// Subscribes to what modules offer that run by now. Nobody is waited for. `has_begun`: there is a time at which
+    /// something can be recorded; before, what is recorded from its oldest record on stays in its ring.
+    pub(super) fn find(
+        &mut self,
+        context: &mut Context,
+        writer: &mut Writer,
+        has_begun: bool,
+    ) -> Result<(), ModuleError> {
         let node = context.link().borrow().participant().node().clone();
         for source in self.sources.iter_mut().filter(|source| source.description.is_none()) {
             let description = match source.own {
@@ -138,7 +144,9 @@ impl Taps {
             self.taps.extend(taps);
         }
         let named = Some(&self.earlier).filter(|_| !self.recording.exact.is_empty());
-        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context, named))
+        let opens = |tap: &&mut Tap| tap.source.is_none() && (has_begun || named.is_none() || !tap.goes_back(context));
+        let opening: Vec<&mut Tap> = self.taps.iter_mut().filter(opens).collect();
+        opening.into_iter().try_for_each(|tap| tap.open(context, named))
     }
 
     /// Records a value that came, if it is to be.
@@ -293,7 +301,9 @@ impl Tap {
         };
         match opened {
             Ok(source) => {
-                if let (Source::Stream(subscription), Some(earlier), Sampling::Each) = (&source, named, self.sampling) {
+                if let (Source::Stream(subscription), Some(earlier)) =
+                    (&source, named.filter(|_| self.goes_back(context)))
+                {
                     self.go_back(context, subscription, earlier);
                 }
                 self.source = Some(source);
@@ -311,21 +321,31 @@ impl Tap {
         Ok(())
     }
 
-    /// A journal, and a stream of records that journals may name, are recorded from behind the last record in a file
-    /// on, or from the oldest one that is kept.
-    fn go_back(&self, context: &mut Context, subscription: &StreamSubscription<()>, earlier: &EarlierFiles) {
-        let id = StreamId { name: self.from, number: self.item.number };
-        let participant = context.link().borrow().participant().clone();
-        let info = participant.node().inspect_stream(id).ok().flatten();
-        let is_long = info.is_some_and(|info| info.shape.record_bytes as usize > WHOLE_BYTES_MAX);
-        // It begins with the oldest one by itself.
-        let is_journal = id.number == JOURNAL_NUMBER;
-        if !is_long && !is_journal {
-            return;
+    /// Whether also those of its records are recorded that were written before the recorder came: of a journal, and of
+    /// a stream of records that journals may name.
+    fn goes_back(&self, context: &Context) -> bool {
+        if (self.sampler.numbering(), self.sampling) != (Numbering::Records, Sampling::Each) {
+            return false;
         }
-        match earlier.behind(&topic(&self.module, &self.item.field.name), &participant, id) {
+        let info = context.link().borrow().participant().node().inspect_stream(self.id()).ok().flatten();
+        self.is_journal() || info.is_some_and(|info| info.shape.record_bytes as usize > WHOLE_BYTES_MAX)
+    }
+
+    fn id(&self) -> StreamId {
+        StreamId { name: self.from, number: self.item.number }
+    }
+
+    fn is_journal(&self) -> bool {
+        self.item.number == JOURNAL_NUMBER
+    }
+
+    /// It is recorded from behind the last record in a file on, or from the oldest one that is kept.
+    fn go_back(&self, context: &mut Context, subscription: &StreamSubscription<()>, earlier: &EarlierFiles) {
+        let participant = context.link().borrow().participant().clone();
+        match earlier.behind(&topic(&self.module, &self.item.field.name), &participant, self.id()) {
             Some(sequence) => context.rewind_to(subscription, sequence),
-            None if is_journal => {}
+            // It begins with the oldest one by itself.
+            None if self.is_journal() => {}
             None => context.rewind(subscription),
         }
     }

@@ -588,7 +588,7 @@ typedef struct rohrpost_module {
   // For the module's own use.
   void *user;
   // Once, before all others, switched off: let it follow here what it follows, and set its period. If it fails, the
-  // process ends.
+  // process ends; with `ROHRPOST_CONFIGURATION` launch does not start it again.
   rohrpost_outcome (*made)(void *user);
   // Begins to work. If it fails, the module is in error and stays off.
   rohrpost_outcome (*on)(void *user);

@@ -45,7 +45,7 @@ pub struct ModuleTable {
     /// For the module's own use.
     pub user: *mut c_void,
     /// Once, before all others, switched off: let it follow here what it follows, and set its period. If it fails, the
-    /// process ends.
+    /// process ends; with `ROHRPOST_CONFIGURATION` launch does not start it again.
     pub made: Option<unsafe extern "C" fn(user: *mut c_void) -> Outcome>,
     /// Begins to work. If it fails, the module is in error and stays off.
     pub on: Option<unsafe extern "C" fn(user: *mut c_void) -> Outcome>,
@@ -172,6 +172,7 @@ impl CModule<'_> {
         say(Code::Failed, format_args!("it does not say why"));
         match entered(context, || function(self.table)).unwrap_or(0) {
             0.. => Ok(()),
+            outcome if outcome == Code::Configuration as i32 => Err(ModuleError::configuration(last_words())),
             _ => Err(ModuleError::new(last_words())),
         }
     }

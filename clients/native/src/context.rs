@@ -138,15 +138,28 @@ impl NativeContext<'_> {
     }
 
     /// Opens a stream of another module of this node, or of which this node has a replica, to look at when the module
-    /// likes. The other one is asked what it offers, at most so long.
+    /// likes. None as long as the other one has not described itself, since it does not run yet: ask again. Where only
+    /// the other one itself can say what it offers, its answer is waited for at most so long. `is_late`: it was asked
+    /// for before, in vain, so that the stream is read from its first record on.
     ///
     /// # Errors
-    /// The other one does not answer, has no such stream, or all its seats are taken.
-    pub fn stream(&mut self, module: &str, item: &str, timeout: Duration) -> Result<NativeStream, NativeError> {
-        let peer = self.peer(module, timeout)?;
+    /// The stream cannot be on this node, the other one has no such stream, or all its seats are taken.
+    pub fn stream(
+        &mut self,
+        module: &str,
+        item: &str,
+        timeout: Duration,
+        is_late: bool,
+    ) -> Result<Option<NativeStream>, NativeError> {
+        let name = self.context.callee(module)?;
+        self.context.require_stream(name, item)?;
+        let Some(peer) = self.state.peers.described(self.context, (module, name), timeout)? else { return Ok(None) };
         let item = item_of(&peer.description, module, item, true)?;
-        let stream = self.context.stream_untyped(peer.name, &item, peer.hash)?;
-        Ok(NativeStream::new(item, stream))
+        let mut stream = self.context.stream_untyped(peer.name, &item, peer.hash)?;
+        if is_late {
+            stream.from(0);
+        }
+        Ok(Some(NativeStream::new(item, stream)))
     }
 
     /// A module that can be called; the first time it is asked what it offers, at most so long.

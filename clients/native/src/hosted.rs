@@ -57,14 +57,15 @@ fn state(interface: NativeInterface, settings: Settings, serves: Name) -> Result
     let mut others = serde_json::Map::new();
     for (name, value) in settings {
         if parameters.has(&name) {
-            parameters.configure(&name, &value)?;
+            let configured = parameters.configure(&name, &value);
+            configured.map_err(|refusal| ModuleError::configuration(refusal.to_string()))?;
         } else if known.contains(&name) {
             others.insert(name, serde_json::to_value(value)?);
         } else {
             let own = known.iter().map(String::as_str);
             let all: Vec<&str> = parameters.names().into_iter().chain(own).collect();
             let all = if all.is_empty() { "it has none".into() } else { format!("it has {}", all.join(", ")) };
-            return Err(ModuleError::new(format!("it has no setting `{name}`; {all}")));
+            return Err(ModuleError::configuration(format!("it has no setting `{name}`; {all}")));
         }
     }
     let settings = serde_json::Value::Object(others).to_string();

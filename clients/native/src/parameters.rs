@@ -1,6 +1,5 @@
 //! Parameters of a module, by their descriptions.
 
-use rohrpost_modules::ModuleError;
 use rohrpost_modules::parameter::{Parameter, ParameterSet, Refusal, from_file};
 use rohrpost_schema::{Field, Value, encode};
 
@@ -29,7 +28,7 @@ impl Parameters {
     }
 
     /// The value that the configuration says.
-    pub(crate) fn configure(&mut self, name: &str, value: &Value) -> Result<(), ModuleError> {
+    pub(crate) fn configure(&mut self, name: &str, value: &Value) -> Result<(), Refusal> {
         let Some(index) = self.index(name) else { return Ok(()) };
         let refused = |text| Refusal::Type { name: name.to_owned(), text };
         let bytes = from_file(&self.0[index].field.ty, value).map_err(refused)?;

@@ -4,7 +4,7 @@ use crate::error::NativeError;
 use rohrpost_mailbox::Name;
 use rohrpost_modules::call::{CallError, Caller};
 use rohrpost_modules::common::{DESCRIBE, GET_DATA, HASH};
-use rohrpost_modules::description::assemble;
+use rohrpost_modules::description::{DescriptionRequest, assemble, noted};
 use rohrpost_modules::runtime::Context;
 use rohrpost_modules::wire::{append, from_bytes};
 use rohrpost_schema::Description;
@@ -24,24 +24,71 @@ pub struct Peer {
 
 /// Those that were asked for, with the texts by which they were.
 #[derive(Default)]
-pub(crate) struct Peers(Vec<(String, Rc<Peer>)>);
+pub(crate) struct Peers {
+    known: Vec<(String, Rc<Peer>)>,
+    /// Asked what they offer, without an answer so far.
+    asked: Vec<(Name, DescriptionRequest)>,
+}
 
 impl Peers {
     /// A module; it is asked what it offers, if it was not before.
     pub(crate) fn find(&mut self, context: &Context, module: &str, timeout: Duration) -> Result<Rc<Peer>, NativeError> {
-        if let Some((_, peer)) = self.0.iter().find(|(known, _)| known == module) {
-            return Ok(peer.clone());
+        if let Some(peer) = self.known(module) {
+            return Ok(peer);
         }
         let name = context.callee(module)?;
         let description = describe(context, name, timeout)?;
+        Ok(self.learn(module, name, description))
+    }
+
+    /// A module that may not run yet, as it describes itself on this node; or else as it answers, within this time or
+    /// at a later look.
+    pub(crate) fn described(
+        &mut self,
+        context: &Context,
+        (module, name): (&str, Name),
+        timeout: Duration,
+    ) -> Result<Option<Rc<Peer>>, NativeError> {
+        if let Some(description) = noted(context.link().borrow().participant().node(), name) {
+            return Ok(Some(Rc::new(Peer { name, hash: description.hash(), description })));
+        }
+        let node = |name| context.installation().node_of(name);
+        if node(name).is_some() && node(name) == node(context.me()) {
+            return Ok(None);
+        }
+        if let Some(peer) = self.known(module) {
+            return Ok(Some(peer));
+        }
+        if timeout.is_zero() {
+            let at = self.asked.iter().position(|(asked, _)| *asked == name).unwrap_or_else(|| {
+                self.asked.push((name, DescriptionRequest::default()));
+                self.asked.len() - 1
+            });
+            let Some(description) = self.asked[at].1.poll(context, name) else { return Ok(None) };
+            self.asked.swap_remove(at);
+            return Ok(Some(self.learn(module, name, description)));
+        }
+        match describe(context, name, timeout) {
+            Ok(description) => Ok(Some(self.learn(module, name, description))),
+            // It does not run yet, or its node does not.
+            Err(CallError::Timeout(..) | CallError::NotSent(_) | CallError::Fault(..)) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn known(&self, module: &str) -> Option<Rc<Peer>> {
+        self.known.iter().find(|(known, _)| known == module).map(|(_, peer)| peer.clone())
+    }
+
+    fn learn(&mut self, module: &str, name: Name, description: Description) -> Rc<Peer> {
         let peer = Rc::new(Peer { name, hash: description.hash(), description });
-        self.0.push((module.to_owned(), peer.clone()));
-        Ok(peer)
+        self.known.push((module.to_owned(), peer.clone()));
+        peer
     }
 
     /// It is asked anew, since it is another by now.
     pub(crate) fn forget(&mut self, module: &str) {
-        self.0.retain(|(known, _)| known != module);
+        self.known.retain(|(known, _)| known != module);
     }
 }
 

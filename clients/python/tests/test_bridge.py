@@ -7,6 +7,7 @@ import importlib
 import sys
 import types
 import unittest
+from collections.abc import Callable
 from typing import Any
 from unittest import mock
 
@@ -19,6 +20,37 @@ from rohrpost.schema.tree import Field
 from .memory import Memory
 
 
+class InHand(contextlib.AbstractContextManager[str]):
+    """Stands for a record, once and again."""
+
+    def __init__(self, find: Callable[[], None] | None) -> None:
+        self.find = find
+
+    def __enter__(self) -> str:
+        if self.find is not None:
+            self.find()
+        return "newest" if self.find is None else "found"
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+class Numbers:
+    """Stands for a stream."""
+
+    def reads(self, what: str, plan: object, held: object) -> None:
+        pass
+
+    def in_hand(self, find: Callable[[], None] | None = None) -> contextlib.AbstractContextManager[str]:
+        return InHand(find)
+
+    def next(self, timeout_s: float) -> tuple[bool, int]:
+        return True, 0
+
+    def record(self, sequence: int) -> bool:
+        return True
+
+
 class Runtime(types.ModuleType):
     """Stands for the part in Rust: one place for records, as a stream has one to spare."""
 
@@ -27,6 +59,13 @@ class Runtime(types.ModuleType):
         self.place = Memory(5000)
         self.told: list[str] = []
         self.refuses = ""
+        self.stream: Numbers | None = None
+        self.asked: list[tuple[float, bool]] = []
+
+    def open_stream(self, module: str, item: str, timeout_s: float, is_late: bool) -> tuple[Numbers, bytes] | None:
+        self.asked.append((timeout_s, is_late))
+        field = field_to_bytes(Field("count", type_of(rp.U8)))
+        return None if self.stream is None else (self.stream, field)
 
     def begin(self, number: int, stamp_ns: int | None, front: bytes, length: int) -> Memory:
         self.told.append("begin")
@@ -203,6 +242,40 @@ class Bridged(unittest.TestCase):
         for words in ("seven b", "eight by"):
             self.assertIsNone(self.bridge.received(0, field, encode(type_of(str), words), 1, 1, 0))
         self.assertEqual(self.painter.noted, ["seven b"])
+
+    def test_a_stream_of_a_module_that_does_not_run_yet_is_read_when_it_does(self) -> None:
+        reader, other = (self.bridge.stream(self.painter, "eye.0", "count", its, 0.5) for its in (rp.U8, rp.F32))
+        self.assertEqual(self.runtime.asked, [(0.5, False)] * 2)
+        no_record, newest = sys.modules["rohrpost.node.streams"].NoRecord, reader.newest()
+        early = [newest, reader.next(), reader.next(0.01), reader.record(0), reader.at(1)]
+        for read in [*(it.__enter__ for it in early), lambda: reader.around(1), lambda: reader.type]:
+            with self.assertRaises(no_record):
+                read()
+        self.assertEqual(reader.missed()["lost"], 0)
+        self.runtime.stream = Numbers()
+        for in_hand, expected in [(newest, "newest"), (early[1], "found"), (early[3], "found"), (newest, "newest")]:
+            with in_hand as record:
+                self.assertEqual(record, expected)
+        self.assertEqual((self.runtime.asked[-1], reader.type), ((0.0, True), type_of(rp.U8)))
+        with self.assertRaisesRegex(rp.Misuse, "is u8, but it is opened for f32"):
+            other.newest().__enter__()
+
+    def test_what_would_fail_each_time_is_told_so(self) -> None:
+        class Failing(rp.Module, klass="failing"):
+            why: BaseException
+
+            def __init__(self) -> None:
+                raise self.why
+
+        for why, is_hopeless in [
+            (OSError("no port"), False), (ValueError("odd"), False), (ImportError("no numpy"), True),
+            (SyntaxError("odd"), True), (rp.Misuse("odd"), True), (rp.Misconfigured("no such module"), True),
+        ]:  # fmt: skip
+            Failing.why = why
+            bridge: Any = sys.modules["rohrpost.node.bridge"]
+            told = bridge.Bridge(Failing).make("failing.0", "{}", [])
+            self.assertEqual(told[1], is_hopeless, told)
+            self.assertIn(str(why).split("(")[0], told[0])
 
     def test_parameters_are_those_of_the_runtime_or_keep_their_values(self) -> None:
         def field(type: Any, value: Any) -> bytes:

@@ -76,6 +76,8 @@ pub(super) struct Child {
     stop_within: Duration,
     phase: Phase,
     process: Option<ModuleProcess>,
+    /// Its present process has joined the node as the module, or its last one had.
+    has_joined: bool,
     mailboxes: Mailboxes,
     /// Its process has ended so, then; what it printed last may still come.
     over: Option<(ExitStatus, Instant)>,
@@ -119,6 +121,7 @@ impl Child {
             stop_within: module.stop_within,
             phase: if is_missing { Phase::LeftOut } else { Phase::Waiting },
             process: None,
+            has_joined: false,
             mailboxes: Mailboxes::None,
             over: None,
             ending: None,
@@ -239,7 +242,7 @@ impl Child {
     pub(super) fn spawn(&mut self, node: &Node, now: Instant) -> Option<String> {
         match self.try_spawn(node, now) {
             Ok(process) => {
-                self.process = Some(process);
+                (self.process, self.has_joined) = (Some(process), false);
                 self.phase = Phase::Starting;
                 self.since = now;
                 self.was_on = false;
@@ -273,6 +276,7 @@ impl Child {
         self.note_switch(node);
         if let Some(process) = &mut self.process {
             process.find_module(node);
+            self.has_joined |= process.last_word(node).is_some();
             match process.end(node) {
                 Ok(Some(status)) => {
                     self.process = None;

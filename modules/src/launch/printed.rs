@@ -175,13 +175,33 @@ fn lock(lines: &Mutex<PrintedLines>) -> MutexGuard<'_, PrintedLines> {
     lines.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// The next line, or so much of a longer one. `rest` is what was read of the one behind it.
+fn next_line(pipe: &mut impl BufRead, rest: &mut Vec<u8>) -> Option<String> {
+    let room = LINE_BYTES_MAX.saturating_sub(rest.len() as u64);
+    let read = io::Read::take(&mut *pipe, room).read_until(b'\n', rest).unwrap_or(0);
+    if read == 0 && rest.is_empty() {
+        return None;
+    }
+    // A character is in one of the two lines.
+    let is_cut = rest.len() as u64 >= LINE_BYTES_MAX && !rest.ends_with(b"\n");
+    let behind = if is_cut { rest.split_off(begun_character(rest)) } else { Vec::new() };
+    let text = String::from_utf8_lossy(rest).trim_end().to_owned();
+    *rest = behind;
+    Some(text)
+}
+
+/// Where the character begins that is not complete at the end of these bytes; their end if all are.
+fn begun_character(bytes: &[u8]) -> usize {
+    let last = bytes.utf8_chunks().last().map_or(&[][..], |chunk| chunk.invalid());
+    let is_begun = std::str::from_utf8(last).is_err_and(|error| error.error_len().is_none());
+    bytes.len() - if is_begun { last.len() } else { 0 }
+}
+
 /// Keeps the last lines that come through a pipe, until it closes.
 fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<PrintedLines>, whisper: Option<&WeakOutputProxy>) {
     let mut pipe = BufReader::new(pipe);
     let mut line = Vec::new();
-    while let Ok(1..) = io::Read::take(&mut pipe, LINE_BYTES_MAX).read_until(b'\n', &mut line) {
-        let text = String::from_utf8_lossy(&line).trim_end().to_owned();
-        line.clear();
+    while let Some(text) = next_line(&mut pipe, &mut line) {
         if let Some(text) = text.strip_prefix(TRACED) {
             let trace = &mut lock(lines).trace;
             if trace.len() < TRACE_LINES_MAX {
@@ -215,6 +235,24 @@ fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<PrintedLines>, whisp
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_long_line_is_cut_between_characters_wherever_it_is_cut() {
+        for (letter, in_front) in [("é", 0), ("é", 1), ("→", 0), ("→", 1), ("→", 2), ("🤖", 1), ("🤖", 2), ("🤖", 3)]
+        {
+            let text = format!("{}{}", "x".repeat(in_front), letter.repeat(5000));
+            let (mut pipe, mut rest) = (text.as_bytes(), Vec::new());
+            let lines: Vec<String> = std::iter::from_fn(|| next_line(&mut pipe, &mut rest)).collect();
+            assert_eq!(lines.concat(), text, "nothing is lost, and nothing is replaced");
+            assert!(lines.iter().all(|line| line.len() as u64 <= LINE_BYTES_MAX));
+        }
+        // What is no text stays as long as it is.
+        let bytes = [0xff; 5000];
+        let (mut pipe, mut rest) = (&bytes[..], Vec::new());
+        let lines: Vec<String> = std::iter::from_fn(|| next_line(&mut pipe, &mut rest)).collect();
+        let letters: usize = lines.iter().map(|line| line.chars().count()).sum();
+        assert_eq!((lines.len(), letters), (2, 5000));
+    }
 
     const QUIET: Duration = Duration::from_secs(10);
 

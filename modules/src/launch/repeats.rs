@@ -1,10 +1,10 @@
-//! How much is said of a module that ends again and again: the first ends whole, then one line for many, at growing
-//! intervals. Knows no process; time comes as an argument.
+//! How much is said of a module that ends again and again: the first end whole, some more in a line each unless they
+//! have another cause, then one line for many, at growing intervals. Knows no process; time comes as an argument.
 
 use std::time::{Duration, Instant};
 
-/// Ends in a row that are reported in full: all that the usual policy allows.
-const WHOLE: u32 = 5;
+/// Ends in a row that are reported each: all that the usual policy allows.
+const EACH: u32 = 5;
 /// Then the tenth is told, the twentieth, the fortieth and so on, and one after this time at the latest.
 const LATEST: Duration = Duration::from_secs(600);
 /// An end for another cause is told whole too, so often at most.
@@ -15,6 +15,8 @@ const OTHER_EVERY: Duration = Duration::from_secs(10);
 pub(super) enum Tell {
     /// All that is known of it, and that so many before it were not told.
     Whole(u32),
+    /// One line: what there is to know was told of the end before.
+    AsBefore,
     /// One line for so many ends, this one and those that were not told, in so much time.
     Sum(u32, Duration),
     /// Nothing.
@@ -39,8 +41,10 @@ impl Repeats {
         let cause = comparable(cause);
         let passed = self.told_at.map_or(Duration::MAX, |at| now.saturating_duration_since(at));
         let is_other = cause != self.cause && passed >= OTHER_EVERY;
-        self.is_quiet = in_a_row >= WHOLE;
-        let tell = if in_a_row <= WHOLE || is_other {
+        self.is_quiet = in_a_row >= EACH;
+        let tell = if (2..=EACH).contains(&in_a_row) && cause == self.cause {
+            Tell::AsBefore
+        } else if in_a_row <= EACH || is_other {
             self.cause = cause;
             Tell::Whole(self.untold)
         } else if in_a_row >= self.next || passed >= LATEST {
@@ -49,7 +53,7 @@ impl Repeats {
             self.untold += 1;
             return Tell::Nothing;
         };
-        (self.untold, self.told_at, self.next) = (0, Some(now), in_a_row.max(WHOLE) * 2);
+        (self.untold, self.told_at, self.next) = (0, Some(now), in_a_row.max(EACH) * 2);
         tell
     }
 
@@ -89,12 +93,12 @@ mod tests {
     }
 
     #[test]
-    fn the_first_ends_are_told_whole_and_then_fewer_and_fewer() {
+    fn the_first_end_is_told_whole_the_next_in_short_and_then_fewer_and_fewer() {
         let second = Duration::from_secs(1);
         let sum = |end, times| (end, Tell::Sum(times, second * times));
-        let whole = (1..=5).map(|end| (end, Tell::Whole(0)));
+        let each = (1..=5).map(|end| (end, if end == 1 { Tell::Whole(0) } else { Tell::AsBefore }));
         let sums = [sum(10, 5), sum(20, 10), sum(40, 20), sum(80, 40), sum(160, 80)];
-        let expected: Vec<_> = whole.chain(sums).collect();
+        let expected: Vec<_> = each.chain(sums).collect();
         assert_eq!(told(200, second, |end| format!("ended with 1\n    process {end}")), expected);
     }
 
@@ -126,7 +130,7 @@ mod tests {
         };
         let all = told(200, Duration::from_secs(11), cause);
         let whole = all.iter().filter(|(_, tell)| matches!(tell, Tell::Whole(_))).count();
-        assert_eq!(whole, 5, "{all:?}");
+        assert_eq!(whole, 1, "{all:?}");
         assert_ne!(comparable("bad pointer 0x7f in map"), comparable("bad pointer 0x7f in wheels"));
         assert_eq!(comparable("a 0x7f, b-1c: 9\n"), "a #, #: #\n");
     }

@@ -26,19 +26,24 @@ pub(super) struct UnderWay {
 
 impl Launch {
     pub(super) fn start_all(&mut self) -> Result<(), LaunchError> {
+        let mut absent = Vec::new();
         for index in 0..self.children.len() {
             // Unless somebody wants it stopped already.
             if self.children[index].phase() == Phase::Waiting {
                 let note = self.children[index].spawn(&self.node, Instant::now());
                 self.note(note);
             }
-            self.await_ready(index)?;
+            if !self.await_ready(index)? {
+                absent.push(index);
+            }
             // At once: switched off, the collector would drop what the others say while they start.
             if self.is_collector(&self.children[index]) {
                 self.switch_on(index);
             }
         }
         self.await_any()?;
+        // Not before it is known that there are others.
+        absent.into_iter().for_each(|index| self.note_absent(index));
         // One after the other, so that each finds those on that it needs.
         for index in 0..self.children.len() {
             self.switch_on(index);
@@ -56,32 +61,34 @@ impl Launch {
         Ok(())
     }
 
-    /// Until this module is ready, or the others begin without it.
-    fn await_ready(&mut self, index: usize) -> Result<(), LaunchError> {
+    /// Until this module is ready, or the others begin without it: then false.
+    fn await_ready(&mut self, index: usize) -> Result<bool, LaunchError> {
         // Looked at before each sleep: nothing may be left that would end it.
         loop {
             let child = &self.children[index];
             match child.phase() {
-                Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended | Phase::LeftOut => return Ok(()),
+                Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended | Phase::LeftOut => return Ok(true),
                 Phase::Failed if child.is_required() => return Err(not_ready(child, child.last_end())),
-                Phase::Failed => {
-                    let note = format!("{} does not start; the others go on without it", child.text());
-                    self.note(Some(note));
-                    return Ok(());
-                }
+                Phase::Failed => return Ok(false),
                 _ if self.never_ready(child) => return Err(not_ready(child, child.last_end())),
-                _ if !child.is_required() && child.restarts() > 0 => {
-                    let note = format!(
-                        "{} does not start yet; the others go on without it, and it is tried again",
-                        child.text()
-                    );
-                    self.note(Some(note));
-                    return Ok(());
-                }
+                _ if !child.is_required() && child.restarts() > 0 => return Ok(false),
                 Phase::Starting | Phase::Waiting | Phase::Stopping => {}
             }
             self.turn(0..index + 1, Duration::MAX, index)?;
         }
+    }
+
+    /// Says of a module that it was not waited for, if it still has not started.
+    fn note_absent(&mut self, index: usize) {
+        let child = &self.children[index];
+        let note = match child.phase() {
+            Phase::Failed => format!("{} does not start; the others go on without it", child.text()),
+            Phase::Waiting | Phase::Starting => {
+                format!("{} does not start yet; the others go on without it, and it is tried again", child.text())
+            }
+            _ => return,
+        };
+        self.note(Some(note));
     }
 
     /// A node has not started if none of its modules starts.

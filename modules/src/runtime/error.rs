@@ -5,6 +5,7 @@ use crate::journal::RunError;
 use crate::output::errno_of;
 use rohrpost_config::{Errors, NameTextError, SettingsError};
 use rohrpost_mailbox::{CreateError, NodeError};
+use std::error::Error;
 use std::path::PathBuf;
 
 /// Why a module did not start.
@@ -100,6 +101,8 @@ pub enum StartError {
         text: String,
         /// The number of the kernel's error, if one is behind it.
         errno: Option<u16>,
+        /// The configuration or the program is wrong.
+        is_configuration: bool,
     },
     /// The system said no.
     #[error("{0}: {1}")]
@@ -131,7 +134,8 @@ impl StartError {
             | Self::Endpoint(..)
             | Self::StandIn { .. }
             | Self::NoStream { .. }
-            | Self::Interface { .. } => Self::CONFIGURATION,
+            | Self::Interface { .. }
+            | Self::Module { is_configuration: true, .. } => Self::CONFIGURATION,
             Self::Node(_)
             | Self::Mailbox(..)
             | Self::Stream(_)
@@ -141,6 +145,14 @@ impl StartError {
             | Self::System(..) => 1,
         }
     }
+}
+
+/// Whether an error, or one behind it, says that the configuration is wrong.
+pub(crate) fn is_misconfigured(error: &(dyn Error + 'static)) -> bool {
+    std::iter::successors(Some(error), |error| (*error).source()).any(|error| {
+        let of_context = || error.downcast_ref::<ContextError>().is_some_and(ContextError::is_configuration);
+        error.is::<NameTextError>() || error.is::<SettingsError>() || of_context()
+    })
 }
 
 /// Why a module cannot speak to another.
@@ -223,4 +235,22 @@ pub enum ContextError {
         /// Its node; `?` beyond the LAN.
         node: String,
     },
+}
+
+impl ContextError {
+    /// Whether the configuration or the program is wrong, so that asking again does not help.
+    pub fn is_configuration(&self) -> bool {
+        match self {
+            Self::Name(_)
+            | Self::Class { .. }
+            | Self::NoMailbox(_)
+            | Self::NoName(_)
+            | Self::Undeclared { .. }
+            | Self::NotStoodIn { .. }
+            | Self::OtherTime
+            | Self::IsStream(_)
+            | Self::FarStream { .. } => true,
+            Self::TooMany | Self::Encode(..) | Self::Node(_) | Self::Record(_) | Self::Read(_) => false,
+        }
+    }
 }

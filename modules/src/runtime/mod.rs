@@ -36,6 +36,7 @@ mod wanted;
 
 pub use clock::ModuleClock;
 pub use context::Context;
+pub(crate) use error::is_misconfigured;
 pub use error::{ContextError, StartError};
 pub use follow::{BadRate, Rate, Subscription};
 pub use host::{ClientError, ToolLink, describe};

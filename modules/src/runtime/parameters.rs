@@ -106,6 +106,7 @@ pub(crate) fn check_start<M: MadeModule>(
             module: text.to_owned(),
             text: format!("its own default: {refusal}"),
             errno: None,
+            is_configuration: true,
         };
         set.accept(index, &parameter.value).map_err(refused)?;
     }

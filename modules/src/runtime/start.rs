@@ -202,11 +202,7 @@ impl Start {
         participant.begin_work(Work::New);
         let made = new(settings, &mut context);
         participant.end_work();
-        let mut made = made.map_err(|error| StartError::Module {
-            module: text.clone(),
-            text: error.to_string(),
-            errno: error.errno(),
-        })?;
+        let mut made = made.map_err(|error| failed(&text, &error))?;
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
@@ -249,12 +245,7 @@ fn checked(
     module: &rohrpost_config::Module,
 ) -> Result<Vec<StandIn>, StartError> {
     let text = |name| installation.classes.format(name);
-    let failed = |error: ModuleError| StartError::Module {
-        module: text(module.name),
-        text: error.to_string(),
-        errno: error.errno(),
-    };
-    let stand_ins = stand_ins.map_err(failed)?;
+    let stand_ins = stand_ins.map_err(|error| failed(&text(module.name), &error))?;
     for (at, StandIn { name, description }) in stand_ins.iter().enumerate() {
         let why = if !module.names().any(|own| own == *name) {
             "it does not have that name"
@@ -269,6 +260,12 @@ fn checked(
         return Err(StartError::StandIn { module, name: text(*name), class, why });
     }
     Ok(stand_ins)
+}
+
+/// What a module says of itself while it is made.
+fn failed(module: &str, error: &ModuleError) -> StartError {
+    let (module, text) = (module.to_owned(), error.to_string());
+    StartError::Module { module, text, errno: error.errno(), is_configuration: error.is_configuration() }
 }
 
 /// A mailbox's shape, as the configuration has it.

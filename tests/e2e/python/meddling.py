@@ -97,10 +97,10 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
 
         def stale() -> None:
             # As a finalizer might do between two lines of Python.
-            reader._stream.record(number)
-            reader._stream.copied(number)
+            reader._opened.stream.record(number)
+            reader._opened.stream.copied(number)
 
-        told.append(f"stale: {said(reader._stream.in_hand(stale).__enter__)}")
+        told.append(f"stale: {said(reader._opened.stream.in_hand(stale).__enter__)}")
         return told
 
     @rp.command(17)
@@ -150,8 +150,8 @@ class Gripper(rp.Module, klass="gripper", settings=("mood",)):
 
         def opened() -> weakref.ref:
             reader = self.stream("odometry.0", "odometry", timeout_s=20)
-            reader._stream.reads("it", ("words", [lambda: reader]), lambda data: reader)
-            reader._newest = reader._stream.in_hand(lambda: reader)
+            reader._opened.stream.reads("it", ("words", [lambda: reader]), lambda data: reader)
+            reader._opened.newest = reader._opened.stream.in_hand(lambda: reader)
             return weakref.ref(reader)
 
         seen = opened()

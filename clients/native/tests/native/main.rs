@@ -71,6 +71,7 @@ fn settings_that_it_does_not_have_end_the_start() {
     ] {
         let refused = Place::new(settings).run_eye().unwrap_err();
         assert!(matches!(&refused, StartError::Module { text, .. } if text.contains(told)), "{refused}");
+        assert_eq!(refused.exit_code(), StartError::CONFIGURATION, "started again, it would end in the same way");
     }
 }
 

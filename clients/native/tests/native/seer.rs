@@ -50,7 +50,10 @@ impl NativeModule for Seer {
             std::ptr::eq(place.address().as_ptr(), data.value.as_ptr()) && place.len() == data.value.len();
         let numbers = match &mut self.numbers {
             Some(numbers) => numbers,
-            none => none.insert(context.stream("eye.0", "count", Duration::from_secs(10))?),
+            none => {
+                let opened = context.stream("eye.0", "count", Duration::from_secs(10), false)?;
+                none.insert(opened.ok_or_else(|| ModuleError::new("its pictures are there, so it is described"))?)
+            }
         };
         let counted = numbers.newest()?.map(|record| match record.bytes {
             StayingBytes::Ring(place) => place.len() as u8,

@@ -82,7 +82,14 @@ impl PythonModule {
         let settings = context.settings().to_owned();
         let me = context.installation().classes.format(context.me());
         let values = self.values(context);
-        self.work(context, |bridge| Ok(bridge.call_method1("make", (me, settings, values))?.unbind()))
+        let failed = self.call(context, |bridge| {
+            bridge.call_method1("make", (me, settings, values))?.extract::<Option<(String, bool)>>()
+        })?;
+        match failed {
+            None => Ok(()),
+            Some((text, true)) => Err(ModuleError::configuration(text)),
+            Some((text, false)) => Err(ModuleError::new(text)),
+        }
     }
 
     /// The bytes of the field of what came.

@@ -19,6 +19,7 @@ pub(crate) fn misuse(py: Python<'_>, text: &str) -> PyErr {
 pub(crate) fn failure(py: Python<'_>, error: NativeError) -> PyErr {
     match error {
         NativeError::Call(error) => call_failure(py, &error),
+        NativeError::Context(error) if error.is_configuration() => exception(py, "Misconfigured", &error.to_string()),
         NativeError::Context(_) | NativeError::Read(_) | NativeError::System(..) => {
             exception(py, "RohrpostError", &error.to_string())
         }

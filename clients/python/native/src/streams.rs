@@ -19,17 +19,24 @@ use std::time::Duration;
 /// Sequence and stamp (ns) of a record.
 type Mark = (u64, u64);
 
-/// Opens a stream of another module, which is asked what it offers; the field of its values.
+/// Opens a stream of another module, which is asked what it offers; the field of its values. None: it does not run yet.
+/// `is_late`: it was asked for before.
 #[pyfunction]
-pub(crate) fn open_stream(py: Python<'_>, module: &str, item: &str, timeout_s: f64) -> PyResult<(Stream, Py<PyBytes>)> {
+pub(crate) fn open_stream(
+    py: Python<'_>,
+    module: &str,
+    item: &str,
+    timeout_s: f64,
+    is_late: bool,
+) -> PyResult<Option<(Stream, Py<PyBytes>)>> {
     drop_left();
     with(py, |context| {
         let timeout = Duration::try_from_secs_f64(timeout_s.max(0.0)).unwrap_or(Duration::MAX);
-        let opened = apart(py, context, |context| context.stream(module, item, timeout));
-        let stream = opened.map_err(|error| failure(py, error))?;
+        let opened = apart(py, context, |context| context.stream(module, item, timeout, is_late));
+        let Some(stream) = opened.map_err(|error| failure(py, error))? else { return Ok(None) };
         let field: &Field = &stream.item.field;
         let field = PyBytes::new(py, &field.to_bytes()).unbind();
-        Ok((Stream::new(stream), field))
+        Ok(Some((Stream::new(stream), field)))
     })
 }
 

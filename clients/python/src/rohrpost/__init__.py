@@ -7,8 +7,8 @@ from .annotations import (
 )  # fmt: skip
 from .common import OutputLevel, State, Status
 from .errors import (
-    BadArguments, BadReply, CallError, CallFault, CallTimeout, FunctionError, Misuse, NoConnection, NotSent,
-    RohrpostError, TooManyCalls,
+    BadArguments, BadReply, CallError, CallFault, CallTimeout, FunctionError, Misconfigured, Misuse, NoConnection,
+    NotSent, RohrpostError, TooManyCalls,
 )  # fmt: skip
 from .faults import Fault
 from .interface import Module, parameter
@@ -22,8 +22,8 @@ from .types import Image, ImageFormat, LaserScan, Odometry, Pose, Twist
 __all__ = [
     "BadArguments", "BadName", "BadPicture", "BadReply", "CallError", "CallFault", "CallTimeout", "Char", "Choice",
     "F32", "F64", "Fault", "FunctionError", "I8", "I16", "I32", "I64", "I128", "Image", "ImageFormat", "Installation",
-    "LaserScan", "Length", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry", "OutputLevel", "Pose",
-    "RohrpostError", "State", "Status", "TooManyCalls", "Twist", "U8", "U16", "U32", "U64", "U128", "Variant",
-    "command", "data", "data_out", "every", "inline", "is_available", "maybe", "on_data", "on_record", "parameter", "run",
-    "said", "stream", "wrapped",
+    "LaserScan", "Length", "Misconfigured", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry",
+    "OutputLevel", "Pose", "RohrpostError", "State", "Status", "TooManyCalls", "Twist", "U8", "U16", "U32",
+    "U64", "U128", "Variant", "command", "data", "data_out", "every", "inline", "is_available", "maybe", "on_data",
+    "on_record", "parameter", "run", "said", "stream", "wrapped",
 ]  # fmt: skip

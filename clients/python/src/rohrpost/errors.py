@@ -21,6 +21,11 @@ class Misuse(RohrpostError):
     """A mistake of this program: a handle that is closed or was opened before a fork, a definition that cannot be."""
 
 
+class Misconfigured(RohrpostError):
+    """What the configuration does not have, or has otherwise: a name of no module, a stream that is on another node.
+    A module that ends with it, or with a mistake of its program, before it runs is not started again."""
+
+
 class NoConnection(RohrpostError):
     """The TCP router is not reached, or lets this program not take part."""
 

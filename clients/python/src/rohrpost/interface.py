@@ -211,7 +211,8 @@ class Module:
     def stream(self, module: str, stream: str, expected: Any = None, timeout_s: float = 1.0) -> StreamReader:
         """A stream of another module, such as ``"camera.0", "image", rp.Image``, to look at when this one likes.
         ``expected``: the type that its values must have; without it they are dicts, lists and numbers. The other module
-        is asked what it offers, at most ``timeout_s`` seconds."""
+        need not run yet. One on another node, of which nothing is known here, is asked what it offers, at most
+        ``timeout_s`` seconds."""
         return self._on_node().stream(self, module, stream, expected, timeout_s)
 
     def watch(self, file: Any, ready: Callable[[], Any], *, write: bool = False) -> int:

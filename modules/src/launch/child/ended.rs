@@ -26,10 +26,15 @@ impl Child {
         // off.
         self.turn_on &= self.configured_on;
         let printed = self.printed.below();
-        // Started again, it would find the same configuration.
+        // Started again, it would find the same configuration, and the same program.
         let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
+        let is_hopeless = misconfigured || !self.has_joined && cannot_begin(status, &self.printed.last());
         let success = status.success();
-        let next = if misconfigured || self.last_incarnation { Next::Stay } else { self.policy.ended(success, now) };
+        let next = if is_hopeless || self.last_incarnation { Next::Stay } else { self.policy.ended(success, now) };
+        let how = match is_hopeless {
+            true => format!("{how}; not started again, since that would end in the same way"),
+            false => how,
+        };
         self.follow(next, &ProcessEnd { is_success: success, how: &how, errno: None, printed: &printed }, now)
     }
 
@@ -63,6 +68,7 @@ impl Child {
             Tell::Whole(untold) => {
                 (format!("{told} ({})", unsaid(untold)), format!("{printed}{}", self.printed.trace_below()))
             }
+            Tell::AsBefore => (format!("{told}; as before"), String::new()),
             Tell::Sum(times, within) => {
                 let last = self.printed.last();
                 let words = if last.is_empty() { String::new() } else { format!("; its last words: {}", cut(&last)) };
@@ -81,6 +87,20 @@ impl Child {
             self.printed.say(OutputLevel::Error, &told, errno);
         }
         Some(format!("{} {told}{below}", self.text))
+    }
+}
+
+/// Whether a process that never became a module can become none as its program is now. Of a program that its
+/// interpreter cannot read, or that misses a package, the interpreter's exit code does not tell; its last line does.
+fn cannot_begin(status: ExitStatus, last_line: &str) -> bool {
+    let error = last_line.split_once(':').map_or("", |(class, _)| class.trim());
+    match status.code() {
+        Some(1) => {
+            ["SyntaxError", "IndentationError", "TabError", "ModuleNotFoundError", "ImportError"].contains(&error)
+        }
+        // Of a shell, `env` and the loader of programs: a program or a library is not there.
+        Some(127) => true,
+        _ => false,
     }
 }
 

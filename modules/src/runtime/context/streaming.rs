@@ -270,6 +270,31 @@ impl Context {
         self.open_known(known, (from, beyond), question, || self.installation.classes.format(from))
     }
 
+    /// Whether this node has a stream of another module, or is to have it: it need not be written yet.
+    ///
+    /// # Errors
+    /// [`ContextError::FarStream`].
+    pub fn require_stream(&self, from: Name, stream: &str) -> Result<(), ContextError> {
+        let beyond = (from.system() != self.me.system()).then_some("?");
+        self.require_stream_here(stream, (from, beyond), || self.installation.classes.format(from))
+    }
+
+    fn require_stream_here(
+        &self,
+        stream: &str,
+        (from, beyond): (Name, Option<&str>),
+        module: impl FnOnce() -> String,
+    ) -> Result<(), ContextError> {
+        let node = beyond.or_else(|| self.installation.node_of(from));
+        let own = self.installation.node_of(self.me);
+        let has_replica = own.is_some_and(|own| self.installation.replica_on(own, from, stream).is_some());
+        // What the configuration does not have may be here: a module of a test, say.
+        match node.filter(|node| own != Some(node) && !has_replica) {
+            Some(node) => Err(ContextError::FarStream { stream: stream.into(), module: module(), node: node.into() }),
+            None => Ok(()),
+        }
+    }
+
     fn open_stream<T>(
         &self,
         port: &StreamPort<T>,
@@ -288,14 +313,7 @@ impl Context {
         question: OpenQuestion,
         module: impl FnOnce() -> String,
     ) -> Result<CheckedReader, ContextError> {
-        let node = beyond.or_else(|| self.installation.node_of(from));
-        let own = self.installation.node_of(self.me);
-        let has_replica = own.is_some_and(|own| self.installation.replica_on(own, from, &known.name).is_some());
-        // What the configuration does not have may be here: a module of a test, say.
-        if let Some(node) = node.filter(|node| own != Some(node) && !has_replica) {
-            let (stream, module) = (known.name.into_owned(), module());
-            return Err(ContextError::FarStream { stream, module, node: node.into() });
-        }
+        self.require_stream_here(&known.name, (from, beyond), module)?;
         let participant = self.link.unseen().borrow().participant().clone();
         let id = StreamId { name: from.module(), number: known.number };
         let question = question(id.into(), known.interface);

@@ -65,7 +65,7 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
         )
     from .. import _node
     from .bridge import Bridge
-    from .output import listen
+    from .output import hear, listen
 
     bridge = Bridge(module)
     _runs = True
@@ -82,13 +82,16 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
         code = _node.run(given, module.interface_.description.to_bytes(), bridge.parameters(), settings, bridge)
     finally:
         _runs = False
+        hear(False)
     sys.exit(code)
 
 
 def _forked() -> None:
     """A child has no part in its parent's module; locks that it kept would tell that the module lives."""
     from .. import _node
+    from .output import hear
 
+    hear(False)
     place = os.path.join(os.path.realpath(_node.forked()), "")
     nothing = os.open(os.devnull, os.O_RDWR | os.O_CLOEXEC)
     for number in map(int, os.listdir("/proc/self/fd")):

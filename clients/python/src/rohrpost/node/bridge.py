@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .. import _node
-from ..errors import FunctionError, Misuse
+from ..errors import FunctionError, Misconfigured, Misuse
 from ..hosts import NodeHost
 from ..interface import Handler, Module, Parameter
 from ..marks import DataOut, OnRecord
@@ -25,8 +25,9 @@ from ..schema.text import describe_type
 from ..schema.tree import Tuple, Type
 from ..remote.calling import expected_type
 from .failures import words_of
+from .output import hear
 from .proxies import NodeProxy
-from .streams import StreamReader
+from .streams import OpenedStream, StreamReader
 from .timed import Timed
 from .views import Held, View, kept
 
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from .._node import Shared
 
 _LOG = logging.getLogger(__name__)
+_HOPELESS = (Misconfigured, Misuse, ImportError, SyntaxError)
+"""Of the configuration, of the program, and of what is installed."""
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -79,6 +82,8 @@ class Bridge(NodeHost):
         self._types: dict[tuple[str, bytes], Type] = {}
         self._timed = Timed([*self._interface.timed, *self._interface.outputs.values()])
         self._is_configuring = False
+        self._is_hopeless = False
+        """What failed last fails each time, however often the module is started."""
         self._watched: dict[int, Callable[[], Any]] = {}
         self._opened: _Opened | None = None
         self._kept: dict[str, View] = {}
@@ -92,9 +97,15 @@ class Bridge(NodeHost):
 
     # For the runtime.
 
+    def make(self, name: str, settings: str, values: list[tuple[str, bytes]]) -> tuple[str, bool] | None:
+        """Makes the module, switched off; or why it cannot be made, and whether that is so each time."""
+        self._is_hopeless = False
+        hear(True)
+        failed = self._make(settings, values)
+        return None if failed is None else (failed, self._is_hopeless)
+
     @_told
-    def make(self, name: str, settings: str, values: list[tuple[str, bytes]]) -> None:
-        """Makes the module, switched off."""
+    def _make(self, settings: str, values: list[tuple[str, bytes]]) -> None:
         self._settings = json.loads(settings)
         # Before its own `__init__`, which may want its settings and parameters.
         module = self._module = self._class.__new__(self._class)
@@ -246,10 +257,17 @@ class Bridge(NodeHost):
         return _node.now()[0]
 
     def stream(self, module: Module, name: str, stream: str, expected: Any, timeout_s: float) -> StreamReader:
-        opened, field = _node.open_stream(name, stream, timeout_s)
-        what = f"`{stream}` of {name}"
-        type = self._checked(field, expected_type(expected), what, "it is opened for")
-        return StreamReader(opened, type, field_from_bytes(field).unit, what)
+        what, ours = f"`{stream}` of {name}", expected_type(expected)
+
+        def opened(timeout_s: float, is_late: bool) -> OpenedStream | None:
+            found = _node.open_stream(name, stream, timeout_s, is_late)
+            if found is None:
+                return None
+            its, field = found
+            type = self._checked(field, ours, what, "it is opened for")
+            return OpenedStream(its, type, field_from_bytes(field).unit, what)
+
+        return StreamReader(opened, what, timeout_s)
 
     def watch(self, module: Module, file: Any, ready: Callable[[], Any], write: bool) -> int:
         number = _node.watch(file if isinstance(file, int) else file.fileno(), not write, write)
@@ -271,6 +289,7 @@ class Bridge(NodeHost):
         return self._module
 
     def _failed(self, error: BaseException) -> str:
+        self._is_hopeless = isinstance(error, _HOPELESS)
         _LOG.debug("in the module's code", exc_info=error)
         return words_of(error)
 

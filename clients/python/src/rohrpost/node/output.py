@@ -1,10 +1,12 @@
-"""``logging`` as the module's output."""
+"""``logging``, and what is printed, as the module's output."""
 
 from __future__ import annotations
 
 import io
 import logging
+import os
 import sys
+import threading
 
 from .. import _node
 from .failures import errno_of
@@ -33,12 +35,60 @@ def _level(number: int) -> int:
     return next((at for at, level in enumerate(levels) if number >= level), len(levels))
 
 
+_SENT = "\x1e"
+"""Begins a printed line that is output already: launch keeps it for what a process said last, and does not send it."""
+
+
+class _Printed(io.TextIOWrapper):
+    """The standard output of a launched module: while it runs, each line is output, in one order with what the module
+    logs."""
+
+    def __init__(self, printed: io.TextIOWrapper) -> None:
+        super().__init__(printed.buffer, printed.encoding, printed.errors, line_buffering=True)
+        self._lock = threading.RLock()
+        self._rest = ""
+        self.is_heard = False
+
+    def write(self, text: str) -> int:
+        with self._lock:
+            if not self.is_heard:
+                return super().write(text)
+            *lines, self._rest = (self._rest + text).split("\n")
+            for line in lines:
+                if line.strip():
+                    _node.say(_level(logging.INFO), line.rstrip())
+                super().write(f"{_SENT}{line}\n")
+        return len(text)
+
+    def end(self) -> None:
+        """Nobody hears it any more; what is no whole line is printed all the same."""
+        with self._lock:
+            rest, self._rest, self.is_heard = self._rest, "", False
+            super().write(rest)
+            self.flush()
+
+
+_printed: _Printed | None = None
+
+
+def hear(is_heard: bool) -> None:
+    """What is printed from now on is output, or is so no more."""
+    if _printed is not None and is_heard:
+        _printed.is_heard = True
+    elif _printed is not None:
+        _printed.end()
+
+
 def listen() -> None:
     """From now on the root logger's records are output. Which of them are sent, the module's output level says."""
     # What is printed is output, too, line by line.
     for printed in (sys.stdout, sys.stderr):
         if isinstance(printed, io.TextIOWrapper):
             printed.reconfigure(line_buffering=True)
+    global _printed
+    # By hand, the terminal has what is printed.
+    if isinstance(sys.stdout, io.TextIOWrapper) and "ROHRPOST_LAUNCHER" in os.environ:
+        sys.stdout = _printed = _Printed(sys.stdout)
     root = logging.getLogger()
     if not any(isinstance(handler, OutputHandler) for handler in root.handlers):
         root.addHandler(OutputHandler())
