@@ -12,6 +12,7 @@ mod merging;
 mod moved;
 mod ordered;
 mod playing;
+mod sought;
 mod support;
 mod telling;
 mod written;
