@@ -117,6 +117,10 @@ impl ModuleOrder<'_> {
                 _ if child.lives > incarnation || child.lives == incarnation && child.phase == Phase::Waiting => {
                     return Err(format!("{text} was started, and ended by itself: {}", child.last_end).into());
                 }
+                // It tries again, by its policy.
+                Phase::Waiting if child.lives < incarnation && child.attempt > 0 => {
+                    return Err(format!("{text} is not started: it {}; launch tries again", child.last_end).into());
+                }
                 Phase::Failed | Phase::Ended => return Err(format!("{text} does not run: {}", child.last_end).into()),
                 _ => self.pause(&child)?,
             }

@@ -5,6 +5,7 @@ use crate::{logd, replay};
 use rohrpost::Start;
 use rohrpost_config::{BUILTINS, RECORDER, REPLAY};
 use rohrpost_modules::runtime::exit;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -15,7 +16,7 @@ pub(super) struct Arguments {
     builtin: String,
     /// The arguments of every module: --config FILE --name CLASS.INSTANCE [--off].
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    arguments: Vec<String>,
+    arguments: Vec<OsString>,
 }
 
 pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {

@@ -10,6 +10,8 @@ use rohrpost::survey::{Scope, Standing, node_of};
 use rohrpost::{Fault, ToolLink};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, NodeError, SendError, local, node_directory};
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -107,8 +109,8 @@ fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
 fn noted_config(node: &Node) -> Result<(PathBuf, String), Failure> {
     let told = |what: &str| format!("{}: its file `{CONFIG_FILE}` {what}; say --config FILE", node.path().display());
     let bytes = node.read_file(CONFIG_FILE)?.ok_or_else(|| told("is not there"))?;
-    match String::from_utf8_lossy(&bytes).lines().collect::<Vec<_>>()[..] {
-        [config, node] => Ok((config.into(), node.into())),
+    match bytes.split(|byte| *byte == b'\n').collect::<Vec<_>>()[..] {
+        [config, node, b""] => Ok((OsStr::from_bytes(config).into(), String::from_utf8_lossy(node).into_owned())),
         _ => Err(told("was written by another version of launch").into()),
     }
 }

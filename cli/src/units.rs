@@ -4,7 +4,7 @@ use super::table::time;
 use crate::terminal::Failure;
 use rohrpost::launch::{Event, events};
 use rohrpost_builtin::format::iso;
-use rohrpost_config::size_text;
+use rohrpost_config::{parse_size, size_text};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
@@ -42,6 +42,12 @@ pub(super) fn rate_or_all(text: &str) -> Result<f64, String> {
         Ok(0.0) => Ok(0.0),
         _ => rate(text).map_err(|why| format!("write 0 for each value, or {}", why.trim_start_matches("write "))),
     }
+}
+
+/// A size argument: bytes, or a number with its unit.
+pub(super) fn size_argument(text: &str) -> Result<u32, String> {
+    let bytes = text.parse::<u64>().or_else(|_| parse_size(text)).map_err(|error| error.to_string())?;
+    u32::try_from(bytes).map_err(|_| format!("at most {}", size_text(u32::MAX.into())))
 }
 
 /// Signals, and whether Ctrl-C was pressed.
@@ -95,6 +101,23 @@ pub(crate) fn size(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_size_has_a_unit_or_is_in_bytes() {
+        for (text, bytes) in [("2048", 2048), ("0", 0), ("1MiB", 1 << 20), ("1.5 KiB", 1536), ("8 B", 8)] {
+            assert_eq!(size_argument(text), Ok(bytes), "{text}");
+        }
+        for (wrong, words) in [
+            ("4GiB", "at most 4294967295 B"),
+            ("1MB", "`MB` is no unit here; write a size with its unit (B, KiB, MiB)"),
+            ("big", "does not begin with a number"),
+            ("-1", "does not begin with a number"),
+            ("1.5", "has no unit"),
+        ] {
+            let told = size_argument(wrong).unwrap_err();
+            assert!(told.contains(words), "{wrong}: {told}");
+        }
+    }
 
     #[test]
     fn times_and_rates_have_bounds() {

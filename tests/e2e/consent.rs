@@ -197,14 +197,14 @@ fn no_text_of_a_file_leaves_its_line() {
         commands.push(words(&["record", "info", "--json", file]));
         commands.push(words(&["record", "recover", file, "--output", &new()]));
         commands.push(words(&["record", "recover", file, "--json", "--output", &new()]));
-        commands.push(words(&["record", "cut", file, &new()]));
-        commands.push(words(&["record", "cut", file, &new(), HOSTILE]));
-        commands.push(words(&["record", "merge", &new(), file]));
+        commands.push(words(&["record", "cut", file, "-o", &new()]));
+        commands.push(words(&["record", "cut", file, "-o", &new(), "--names", HOSTILE]));
+        commands.push(words(&["record", "merge", file, "-o", &new()]));
         for other in [packed, ours, bag] {
-            commands.push(words(&["record", "merge", &new(), file, other]));
+            commands.push(words(&["record", "merge", file, other, "-o", &new()]));
         }
-        commands.push(words(&["record", "export", file, &new(), "--format", "drawn"]));
-        commands.push(words(&["record", "export", file, "-", "--format", "json"]));
+        commands.push(words(&["record", "export", file, "-o", &new(), "--format", "drawn"]));
+        commands.push(words(&["record", "export", file, "-o", "-", "--format", "json"]));
         commands.push(words(&["log", "--file", file]));
         commands.push(words(&["replay", file]));
         commands.push(words(&["replay", file, "--run", "x"]));

@@ -384,7 +384,8 @@ fn a_journal_that_began_before_its_recording_is_refused_until_the_files_are_merg
     assert_eq!((&run["result"], &run["events"]), (&"refused".into(), &0.into()), "{run:#}");
     assert!(run["why"].as_str().unwrap().contains("before the recording did"), "{run:#}");
     let all = place.path("all.mcap");
-    place.say(&["record", "merge", all.to_str().unwrap(), first.to_str().unwrap(), second.to_str().unwrap()]).ok();
+    let [one, other, to] = [&first, &second, &all].map(|path| path.to_str().unwrap());
+    place.say(&["record", "merge", one, other, "-o", to]).ok();
     let run = &replayed(&place, &all, &[])[0];
     assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
     let told = place.say(&["replay", "--exact", all.to_str().unwrap(), "seer.7"]).fails();

@@ -63,7 +63,8 @@ fn long_records_are_taken_out_of_the_recording_and_a_missing_one_is_refused() {
     assert!(listed.contains("it is given what is recorded anyhow: record 0 of stream 2 of 1.110.0.0, "), "{listed}");
 
     let part = place.path("part.mcap");
-    place.say(&["record", "cut", file.to_str().unwrap(), part.to_str().unwrap(), "seer.0/journal"]).ok();
+    let [from, to] = [&file, &part].map(|path| path.to_str().unwrap());
+    place.say(&["record", "cut", from, "-o", to, "--names", "seer.0/journal"]).ok();
     let run = &replayed(&place, &part, &[])[0];
     assert_eq!(run["result"], "refused", "{run:#}");
     assert!(run["events"].as_u64() > Some(2), "{run:#}");
@@ -107,7 +108,7 @@ fn a_recorder_that_starts_again_goes_on_behind_what_is_in_a_file() {
     assert_eq!(sequences, (0..sequences.len() as u32).collect::<Vec<_>>(), "nothing twice, and nothing missing");
     let all = place.path("all.mcap");
     let merged = files.iter().map(|file| file.to_str().unwrap());
-    let command: Vec<&str> = ["record", "merge", all.to_str().unwrap()].into_iter().chain(merged).collect();
+    let command: Vec<&str> = ["record", "merge", "-o", all.to_str().unwrap()].into_iter().chain(merged).collect();
     place.say(&command).ok();
     let run = &replayed(&place, &all, &[])[0];
     assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");

@@ -204,9 +204,9 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["replay", bag, "--into", &into, &into],
         &["replay", recording, "--into", &into],
         &["record", "info", recording],
-        &["record", "cut", recording, &place.path("cut.mcap").display().to_string(), HOSTILE],
-        &["record", "export", recording, &place.path("drawn.mcap").display().to_string(), "--format", "drawn"],
-        &["record", "export", recording, "-", "--format", "json"],
+        &["record", "cut", recording, "-o", &place.path("cut.mcap").display().to_string(), "--names", HOSTILE],
+        &["record", "export", recording, "-o", &place.path("drawn.mcap").display().to_string(), "--format", "drawn"],
+        &["record", "export", recording, "-o", "-", "--format", "json"],
         &["log", "--file", recording],
         &["replay", recording],
         &["replay", recording, "--config", config.to_str().unwrap()],
@@ -281,7 +281,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["list", "--json"],
         &["top", "--once", "--json"],
         &["record", "info", recording, "--json"],
-        &["record", "export", recording, "-", "--format", "json"],
+        &["record", "export", recording, "-o", "-", "--format", "json"],
     ] {
         let said = place.say(words);
         assert_plain(words, &said.out);

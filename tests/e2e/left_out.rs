@@ -59,7 +59,7 @@ fn a_module_that_was_left_out_starts_when_its_program_is_there() {
         assert_left_out(&place, "probe.1");
         for order in ["start", "restart"] {
             let told = place.say(&[order, "probe.1"]).fails();
-            assert!(told.contains(&format!("probe.1 stays left out: for launch {place_told}")), "{order}: {told}");
+            assert!(told.contains(&format!("probe.1 is not started: for launch {place_told}")), "{order}: {told}");
         }
         let told = place.say(&["stop", "probe.1"]).fails();
         assert!(told.contains("probe.1 is left out and never ran, since its program is missing"), "{told}");
@@ -116,11 +116,40 @@ fn a_program_that_disappears_while_its_module_runs_is_no_reason_to_leave_it_out(
     signal(robot.pid("probe.1"), Signal::SIGKILL);
     launch.wait_for("probe.1 was killed by signal 9");
     let told = place.say(&["start", "probe.1"]).fails();
-    assert!(told.contains("probe.1 does not run: could not be started: ") && told.contains("No such file"), "{told}");
+    assert!(told.contains("probe.1 is not started: for launch `./late` is no program at "), "{told}");
     drop(robot);
     launch.signal(Signal::SIGINT);
     assert_eq!(launch.end().code(), Some(1), "it has failed");
-    assert!(launch.err().contains("probe.1 failed for good: could not be started"), "{}", launch.err());
+    assert!(launch.err().contains("probe.1 failed for good: was killed by signal 9"), "{}", launch.err());
+}
+
+#[test]
+fn start_and_restart_say_at_once_why_a_program_does_not_run() {
+    let place = Place::new();
+    let policy = "restart = { policy = \"on-failure\", backoff = \"10 min\", within = \"1 h\" }\noptional";
+    let module = late("probe.1", "./late").replace("optional", policy);
+    let (mut launch, robot) = launch(&place, &[&module, &probe("probe.0", "", "")]);
+    launch.wait_for("runs: 1 module");
+    build(&place.path("late"));
+    place.say(&["start", "probe.1"]).ok();
+    let pid = robot.pid("probe.1");
+    fs::remove_file(place.path("late")).unwrap();
+    let told = place.say(&["restart", "probe.1"]).fails();
+    assert!(told.contains("probe.1 is not started: for launch `./late` is no program at "), "{told}");
+    assert_eq!(robot.pid("probe.1"), pid, "it goes on");
+    // The kernel looks for the interpreter, and nobody before.
+    fs::write(place.path("late"), "#!/nowhere/python\n").unwrap();
+    fs::set_permissions(place.path("late"), fs::Permissions::from_mode(0o755)).unwrap();
+    for order in ["restart", "start"] {
+        let told = place.say(&[order, "probe.1"]).fails();
+        assert!(told.contains("probe.1 is not started: it could not be started: "), "{order}: {told}");
+        assert!(told.contains("No such file") && told.contains("launch tries again"), "{order}: {told}");
+    }
+    fs::remove_file(place.path("late")).unwrap();
+    build(&place.path("late"));
+    assert!(place.say(&["start", "probe.1"]).ok().contains("probe.1 runs and is on"));
+    drop(robot);
+    launch.stop();
 }
 
 /// What `cargo demo` does: the GUI's program is built beside the robot.

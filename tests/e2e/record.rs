@@ -67,12 +67,12 @@ fn a_recording_is_described_cut_merged_and_recovered() {
     let part = place.path("part.mcap");
     let part = part.to_str().unwrap();
     let times = ["--from", "+1s", "--until", "-2.99s", "--json"];
-    let told = place.say(&[&["record", "cut", file, part, "motor.1"], &times[..]].concat()).json();
+    let told = place.say(&[&["record", "cut", file, "-o", part, "--names", "motor.1"], &times[..]].concat()).json();
     assert_eq!(told["messages"], 300);
     let other = recording(&place, "arm");
     let all = place.path("all.mcap");
     let all = all.to_str().unwrap();
-    let text = place.say(&["record", "merge", all, file, other.to_str().unwrap()]).ok();
+    let text = place.say(&["record", "merge", file, other.to_str().unwrap(), "-o", all]).ok();
     assert!(text.starts_with(&format!("{all}: 2000 messages, ")), "{text}");
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
@@ -115,7 +115,7 @@ fn a_recording_is_exported_as_json() {
     let file = poses(&place);
     let (file, to) = (file.to_str().unwrap(), place.path("poses.jsonl"));
     let to = to.to_str().unwrap();
-    let export = ["record", "export", file, to, "--format", "json", "--names", "mapper.0"];
+    let export = ["record", "export", file, "-o", to, "--format", "json", "--names", "mapper.0"];
     let text = place.say(&export).ok();
     assert!(text.starts_with(&format!("{to}: 10 messages, ")), "{text}");
     let text = std::fs::read_to_string(to).unwrap();
@@ -129,7 +129,7 @@ fn a_recording_is_exported_as_json() {
     );
     assert!(lines[9].ends_with(r#""value":{"x_m":9.0,"y_m":0.5,"heading_rad":"NaN"}}"#), "{}", lines[9]);
     assert!(place.say(&export).fails().contains("is there already"));
-    let part = ["record", "export", file, "-", "--format", "json", "--from", "+0.5s", "--rate", "5"];
+    let part = ["record", "export", file, "-o", "-", "--format", "json", "--from", "+0.5s", "--rate", "5"];
     let text = place.say(&part).ok();
     let topics = text.lines().map(|line| line.split('"').nth(3).unwrap_or_default());
     let count = |topic: &str| topics.clone().filter(|its| *its == topic).count();
@@ -142,7 +142,7 @@ fn a_recording_is_exported_for_others_to_draw() {
     let file = poses(&place);
     let (file, to) = (file.to_str().unwrap(), place.path("drawn.mcap"));
     let to = to.to_str().unwrap();
-    let text = place.say(&["record", "export", file, to, "--format", "drawn"]).ok();
+    let text = place.say(&["record", "export", file, "-o", to, "--format", "drawn"]).ok();
     for words in [
         ": 19 messages, ",
         "\nmapper.0/pose/pose: 9\nmapper.0/pose/transform: 9\nworld/transform: 1\n",
@@ -157,12 +157,12 @@ fn a_recording_is_exported_for_others_to_draw() {
     let told = place.say(&["record", "info", to, "--json"]).json();
     assert_eq!(told["channels"][0]["drawn_of"], "mapper.0/pose");
     assert!(
-        place.say(&["record", "export", to, "-", "--format", "json"]).ok().is_empty(),
+        place.say(&["record", "export", to, "-o", "-", "--format", "json"]).ok().is_empty(),
         "it is not what was recorded"
     );
     let both = place.path("both.mcap");
     let with =
-        ["record", "export", file, both.to_str().unwrap(), "--format", "drawn", "--with-original", "--rate", "5"];
+        ["record", "export", file, "-o", both.to_str().unwrap(), "--format", "drawn", "--with-original", "--rate", "5"];
     assert!(place.say(&with).ok().contains(": 21 messages, "));
 }
 
@@ -174,22 +174,31 @@ fn mistakes_with_recordings_are_explained() {
     let part = place.path("part.mcap");
     let part = part.to_str().unwrap();
     for (arguments, words) in [
-        (&["record", "cut", file, part, "motor.7"][..], "has no `motor.7`; it has motor.0/pace, motor.1/pace"),
-        (&["record", "cut", file, file], "is there already; remove it, or name another file"),
-        (&["record", "merge", file, file], "is there already"),
+        (
+            &["record", "cut", file, "-o", part, "--names", "motor.7"][..],
+            "has no `motor.7`; it has motor.0/pace, motor.1/pace",
+        ),
+        (&["record", "cut", file, "-o", file], "is there already; remove it, or name another file"),
+        (&["record", "merge", file, "-o", file], "is there already"),
         (&["record", "info", "/dev/null/none"], "cannot read"),
-        (&["record", "cut", file, part, "--from", "-1s", "--until", "+1s"], "the time range is empty"),
-        (&["record", "export", file, part, "--format", "drawn"], "nothing of it can be drawn; poses, "),
-        (&["record", "export", file, part, "--format", "json", "--names", "motor.7"], "has no `motor.7`; it has "),
-        (&["record", "export", file, file, "--format", "json"], "is there already; remove it, or name another file"),
-        (&["record", "export", file, part, "--format", "json", "--with-original"], "is for --format drawn"),
+        (&["record", "cut", file, "-o", part, "--from", "-1s", "--until", "+1s"], "the time range is empty"),
+        (&["record", "export", file, "-o", part, "--format", "drawn"], "nothing of it can be drawn; poses, "),
+        (
+            &["record", "export", file, "-o", part, "--format", "json", "--names", "motor.7"],
+            "has no `motor.7`; it has ",
+        ),
+        (
+            &["record", "export", file, "-o", file, "--format", "json"],
+            "is there already; remove it, or name another file",
+        ),
+        (&["record", "export", file, "-o", part, "--format", "json", "--with-original"], "is for --format drawn"),
     ] {
         let told = place.say(arguments).fails();
         assert!(told.contains(words), "{arguments:?}: {told}");
     }
-    let said = place.say(&["record", "cut", file, part, "--from", "noon"]);
+    let said = place.say(&["record", "cut", file, "-o", part, "--from", "noon"]);
     assert!(said.code == Some(2) && said.err.contains("before the end (-10s)"), "{said:?}");
-    let said = place.say(&["record", "export", file, part, "--format", "drawn", "--rate", "0"]);
+    let said = place.say(&["record", "export", file, "-o", part, "--format", "drawn", "--rate", "0"]);
     assert!(said.code == Some(2) && said.err.contains("from 0.001 to 1000000 a second"), "{said:?}");
     assert!(!std::path::Path::new(part).exists());
 }

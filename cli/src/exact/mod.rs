@@ -97,7 +97,7 @@ pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
 
 fn canonical(folder: &Path) -> Result<String, Failure> {
     let found = folder.canonicalize().map_err(|error| format!("--folder {}: {error}", folder.display()))?;
-    Ok(found.display().to_string())
+    found.into_os_string().into_string().map_err(|name| format!("--folder {}: is no UTF-8 text", name.display()).into())
 }
 
 /// Each run with its number among those of its module, from 1 on.

@@ -27,8 +27,10 @@ pub(super) struct CutArguments {
     /// Recording.
     file: PathBuf,
     /// New file.
-    to: PathBuf,
+    #[arg(long, short, value_name = "FILE")]
+    output: PathBuf,
     /// Names (laser.0) or topics (laser.0/scan) to keep; all, if none is named.
+    #[arg(long, num_args = 1.., value_name = "NAME")]
     names: Vec<String>,
     #[command(flatten)]
     part: PartArguments,
@@ -39,11 +41,12 @@ pub(super) struct CutArguments {
 
 #[derive(clap::Args)]
 pub(super) struct MergeArguments {
-    /// New file.
-    to: PathBuf,
     /// Recordings.
-    #[arg(required = true)]
+    #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
+    /// New file.
+    #[arg(long, short, value_name = "FILE")]
+    output: PathBuf,
     /// One JSON object.
     #[arg(long)]
     json: bool,
@@ -90,7 +93,7 @@ fn recovered_text(file: &Path, told: &Recovered) -> String {
 }
 
 pub(super) fn cut(arguments: &CutArguments) -> Result<ExitCode, Failure> {
-    let CutArguments { file, to, names, part, json } = arguments;
+    let CutArguments { file, output: to, names, part, json } = arguments;
     let selection = part.of(&rohrpost_recording::info(file)?, names);
     let mut line = ProgressLine::new();
     let told = rohrpost_recording::cut(file, to, &selection, &mut |read, all| line.tell(read, all));
@@ -100,7 +103,7 @@ pub(super) fn cut(arguments: &CutArguments) -> Result<ExitCode, Failure> {
 }
 
 pub(super) fn merge(arguments: &MergeArguments) -> Result<ExitCode, Failure> {
-    let MergeArguments { to, files, json } = arguments;
+    let MergeArguments { files, output: to, json } = arguments;
     let mut line = ProgressLine::new();
     let told = rohrpost_recording::merge(files, to, &mut |read, all| line.tell(read, all));
     drop(line);

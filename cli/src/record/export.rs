@@ -16,7 +16,8 @@ pub(super) struct ExportArguments {
     /// Recording.
     file: PathBuf,
     /// New file; with JSON `-` is the standard output.
-    to: PathBuf,
+    #[arg(long, short, value_name = "FILE")]
+    output: PathBuf,
     /// What is made of it.
     #[arg(long, value_enum)]
     format: ExportFormat,
@@ -52,7 +53,7 @@ fn parse_rate(text: &str) -> Result<u64, String> {
 }
 
 pub(super) fn run(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
-    let ExportArguments { file, to, format, names, part, rate, with_original } = arguments;
+    let ExportArguments { file, output: to, format, names, part, rate, with_original } = arguments;
     if *with_original && *format == ExportFormat::Json {
         return Err("--with-original is for --format drawn: JSON has what was recorded, and nothing else".into());
     }

@@ -20,11 +20,11 @@ use std::process::ExitCode;
 #[command(after_help = "Examples:
   rohrpost record info base-0001.mcap                             what is in a file
   rohrpost record recover base-0003.mcap                          makes base-0003.recovered.mcap
-  rohrpost record cut base-0001.mcap part.mcap --from +10s --until +20s
-  rohrpost record cut base-0001.mcap scans.mcap laser.0 odometry.0/pose
-  rohrpost record merge all.mcap base-0001.mcap base-0002.mcap arm-0001.mcap
-  rohrpost record export base-0001.mcap drawn.mcap --format drawn --rate 10; rerun drawn.mcap
-  rohrpost record export base-0001.mcap - --format json --names pilot.0
+  rohrpost record cut base-0001.mcap -o part.mcap --from +10s --until +20s
+  rohrpost record cut base-0001.mcap -o scans.mcap --names laser.0 odometry.0/pose
+  rohrpost record merge base-0001.mcap base-0002.mcap arm-0001.mcap -o all.mcap
+  rohrpost record export base-0001.mcap -o drawn.mcap --format drawn --rate 10; rerun drawn.mcap
+  rohrpost record export base-0001.mcap -o - --format json --names pilot.0
   rohrpost record mark door open                                  marks this moment in the recording that runs
   rohrpost record rotate                                          closes its file, and begins the next
 No file is ever changed or overwritten. Other programs read the files, too (MCAP); Rerun and Foxglove draw what is

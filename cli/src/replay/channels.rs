@@ -24,8 +24,9 @@ pub(super) struct PlayedChannels {
     opaque: Vec<u8>,
     /// Recorded epochs, and those of the node in their place.
     epochs: Vec<(u64, u64)>,
-    /// Values that were published.
+    /// Values that were published: in their turn, and from before the place where it began.
     pub(super) played: u64,
+    pub(super) older: u64,
     /// Values that their streams did not take.
     pub(super) refused: u64,
 }
@@ -86,7 +87,8 @@ impl PlayedChannels {
         match context.publish_as(channel.from, channel.number, stamp, value) {
             Ok(()) => {
                 channel.has_played = true;
-                self.played += 1;
+                let count = if recorded.is_repeated() { &mut self.older } else { &mut self.played };
+                *count += 1;
             }
             Err(ContextError::Record(error)) => {
                 self.refused += 1;

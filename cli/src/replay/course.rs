@@ -27,6 +27,8 @@ pub(super) enum Move<'a> {
     Wait { until_ns: u64 },
     /// Ask again at once.
     Again,
+    /// It begins anew: what comes next is of another round.
+    Round,
     /// It is at its end just now.
     End,
     /// Nothing, until it is told something.
@@ -61,6 +63,8 @@ pub(super) struct Course {
     step: Option<CourseStep>,
     /// Time has begun since the last seek.
     has_begun: bool,
+    /// It was told something, so those that are to hear what is played listen. Before that nothing is played.
+    is_told: bool,
     /// There is no further value in this round.
     is_over: bool,
     /// And none will be.
@@ -79,6 +83,7 @@ impl Course {
             is_paused: true,
             step: None,
             has_begun: false,
+            is_told: false,
             is_over: false,
             has_ended: false,
             has_played: false,
@@ -101,26 +106,34 @@ impl Course {
         self.rounds
     }
 
+    /// Time stands still; what is older than the place where it stands is played.
     pub(super) fn pause(&mut self) {
-        self.is_paused = true;
+        (self.is_paused, self.is_told) = (true, true);
     }
 
     pub(super) fn resume(&mut self) {
-        (self.is_paused, self.step) = (false, None);
+        (self.is_paused, self.is_told, self.step) = (false, true, None);
     }
 
     /// Pauses, and plays the next value.
     pub(super) fn step(&mut self) {
-        (self.is_paused, self.step) = (true, Some(CourseStep::Next));
+        self.pause();
+        self.step = Some(CourseStep::Next);
     }
 
     /// Pauses, and plays what is due until this time.
     pub(super) fn step_until(&mut self, until_ns: u64) {
-        (self.is_paused, self.step) = (true, Some(CourseStep::Until(until_ns)));
+        self.pause();
+        self.step = Some(CourseStep::Until(until_ns));
     }
 
-    /// Goes to the first value that arrived then or later; to the end if there is none.
+    /// Goes to the first value that arrived then or later, and plays the newest of before; to the end if there is none.
     pub(super) fn seek(&mut self, arrival_ns: u64) -> Result<(), ReadError> {
+        self.is_told = true;
+        self.go_to(arrival_ns)
+    }
+
+    fn go_to(&mut self, arrival_ns: u64) -> Result<(), ReadError> {
         (self.has_begun, self.has_ended, self.has_played, self.step) = (false, false, false, None);
         self.is_over = true;
         self.is_over = !self.player.seek(arrival_ns)?;
@@ -128,7 +141,7 @@ impl Course {
     }
 
     fn go_to_begin(&mut self) -> Result<(), ReadError> {
-        self.seek(self.part.from_ns.unwrap_or_default())
+        self.go_to(self.part.from_ns.unwrap_or_default())
     }
 
     /// What is to be done, when the node's time is this one.
@@ -139,7 +152,8 @@ impl Course {
         if self.is_over {
             return self.end_round();
         }
-        if self.has_ended || (self.has_begun && self.is_paused && self.step.is_none()) {
+        let is_older = self.is_told && self.player.has_older();
+        if self.has_ended || (self.has_begun && self.is_paused && self.step.is_none() && !is_older) {
             return Ok(Move::Rest);
         }
         let due_ns = match self.step {
@@ -168,7 +182,8 @@ impl Course {
             Cue::Message(channel, message) => {
                 self.has_played = true;
                 let time_ns = self.step.map(|_| message.arrival_ns);
-                self.step = self.step.filter(|step| matches!(step, CourseStep::Until(_)));
+                // What is older is no step.
+                self.step = self.step.filter(|step| is_older || matches!(step, CourseStep::Until(_)));
                 Move::Play { time_ns, channel, message }
             }
             Cue::Wait { .. } if self.step.is_some() => {
@@ -193,7 +208,7 @@ impl Course {
         if self.part.repeats && self.has_played {
             self.rounds = self.rounds.saturating_add(1);
             self.go_to_begin()?;
-            return Ok(Move::Again);
+            return Ok(Move::Round);
         }
         self.has_ended = true;
         Ok(Move::End)

@@ -11,11 +11,14 @@ enum Did {
     Begun(u64),
     /// The value that arrived then, at this time of the node.
     Played(u64, u64),
+    /// The value of this stamp, from before the place where it began.
+    Older(u64),
     Advanced(u64),
+    Round,
     Ended,
 }
 
-use Did::{Advanced, Begun, Ended, Played};
+use Did::{Advanced, Begun, Ended, Older, Played, Round};
 
 /// Arrivals and their epochs.
 const STEPPED: [(u64, u64); 5] = [(100, 1), (150, 1), (150, 1), (40, 2), (90, 2)];
@@ -51,6 +54,10 @@ impl CourseTest {
                     self.now_ns = system_ns;
                     did.push(Begun(system_ns));
                 }
+                Move::Play { channel, message, .. } if channel.is_repeated() => {
+                    assert_eq!(message.arrival_ns, self.now_ns, "where it is played");
+                    did.push(Older(message.stamp_ns));
+                }
                 Move::Play { time_ns, message, .. } => {
                     let arrival_ns = message.arrival_ns;
                     self.now_ns = self.now_ns.max(time_ns.unwrap_or_default());
@@ -65,6 +72,7 @@ impl CourseTest {
                     self.now_ns = until_ns;
                 }
                 Move::Again => {}
+                Move::Round => did.push(Round),
                 Move::End => did.push(Ended),
                 Move::Rest => break,
             }
@@ -116,14 +124,45 @@ fn a_pause_stops_at_once_and_a_seek_shows_where_it_is() {
     test.course.pause();
     assert_eq!(test.go(9), []);
     test.course.seek(120).unwrap();
-    assert_eq!(test.go(9), [Begun(150)]);
+    assert_eq!(test.go(9), [Begun(120), Older(100)], "what is true there is played in a pause, too");
     test.course.seek(0).unwrap();
     assert_eq!(test.go(9), [Begun(100)]);
     test.course.seek(151).unwrap();
     assert_eq!(test.go(9), [Ended]);
     test.course.seek(120).unwrap();
     test.course.resume();
-    assert_eq!(test.go(3), [Begun(150), Played(150, 150), Played(150, 150)]);
+    assert_eq!(test.go(4), [Begun(120), Older(100), Played(150, 150), Played(150, 150)]);
+}
+
+#[test]
+fn where_it_begins_the_newest_of_before_waits_until_somebody_listens_and_is_no_step() {
+    let part = Part { from_ns: Some(120), ..Part::default() };
+    let mut test = CourseTest::new(&STEPPED, part);
+    assert_eq!(test.go(9), [Begun(120)]);
+    test.course.pause();
+    assert_eq!(test.go(9), [Older(100)]);
+    test.course.step();
+    assert_eq!(test.go(9), [Played(150, 150)]);
+    let mut test = CourseTest::new(&STEPPED, part);
+    test.course.step();
+    assert_eq!(test.go(9), [Begun(120), Older(100), Played(150, 150)]);
+}
+
+#[test]
+fn between_two_rounds_there_is_a_place_to_wait() {
+    for (values, part, round) in [
+        (&[(100, 1)][..], Part { repeats: true, ..Part::default() }, &[Begun(100), Played(100, 100)][..]),
+        (
+            &[(100, 1), (150, 1)],
+            Part { from_ns: Some(150), repeats: true, ..Part::default() },
+            &[Begun(150), Older(100), Played(150, 150)],
+        ),
+    ] {
+        let mut test = CourseTest::new(values, part);
+        test.course.resume();
+        let rounds = [round, &[Round], round, &[Round]].concat();
+        assert_eq!(test.go(rounds.len()), rounds);
+    }
 }
 
 #[test]
@@ -132,9 +171,9 @@ fn a_part_is_played_over_and_over() {
     let values = [(100, 1), (150, 1), (159, 1), (160, 1)];
     let mut test = CourseTest::new(&values, part);
     test.course.resume();
-    let round = [Begun(150), Played(150, 150), Played(159, 159)];
-    assert_eq!(test.go(6), [round, round].concat());
-    assert_eq!(test.course.rounds(), 1);
+    let round = [Begun(101), Older(100), Played(150, 150), Played(159, 159), Round];
+    assert_eq!(test.go(10), [round, round].concat());
+    assert_eq!(test.course.rounds(), 2);
     for (part, did) in [
         (Part { from_ns: Some(300), until_ns: None, repeats: true }, vec![Ended]),
         (Part { from_ns: None, until_ns: Some(50), repeats: true }, vec![Ended]),

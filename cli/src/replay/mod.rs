@@ -17,6 +17,7 @@ mod permitted;
 mod player;
 mod recorded;
 mod session;
+mod settings;
 mod sizes;
 mod spacing;
 mod tables;
@@ -40,13 +41,13 @@ use rohrpost::schema::Description;
 use rohrpost::wire::append;
 use rohrpost_config::{Installation, StreamSpec};
 use session::ReplaySession;
+use settings::WantedCourse;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::SystemTime;
-use toml::{Table, Value};
 
 /// The name of the configuration that is made.
 const CONFIG: &str = "replay.toml";
@@ -210,6 +211,12 @@ struct MadeReplay {
 fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) -> Result<MadeReplay, Failure> {
     let here = std::env::current_dir()?;
     let (source, base) = source(arguments, recorded, &here, folder)?;
+    if let Some(odd) = [&here, &base].into_iter().find(|folder| folder.to_str().is_none()) {
+        let shown = odd.display();
+        return Err(
+            format!("{shown}: its name is no UTF-8 text, as configurations are; replay in another folder").into()
+        );
+    }
     let saved = folder.join("parameters.toml");
     let saved_text = match (&source.parameters, &arguments.config) {
         (None, _) => None,
@@ -242,7 +249,8 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         let runs = |name: &str| arguments.run.iter().any(|run| run == name);
         std::fs::write(&saved, saved_of(&text, runs)?)?;
     }
-    let mut settings = settings(arguments, recorded, &played, folder)?;
+    let course = WantedCourse { part: &arguments.part, rate: arguments.rate, repeats: arguments.repeats };
+    let mut settings = settings::made(&course, recorded, &played, folder)?;
     match noted_answers(recorded, &source, &played, folder) {
         Ok(None) => {}
         Ok(Some(answers)) => {
@@ -343,58 +351,4 @@ fn noted_answers(
     let mut bytes = Vec::new();
     append(&mut bytes, &JournalAnswers::read(&recorded.infos, (source, &modules), folder)?)?;
     Ok(Some(bytes))
-}
-
-/// The player's settings, and files with the descriptions.
-fn settings(
-    arguments: &Arguments,
-    recorded: &RecordedFiles,
-    played: &PlayedModules,
-    folder: &Path,
-) -> Result<Table, Failure> {
-    let mut described = Vec::new();
-    for (name, description) in &played.described {
-        let file = format!("{name}.description");
-        std::fs::write(folder.join(&file), description.to_bytes())?;
-        described.push(Value::Array(vec![name.as_str().into(), file.into()]));
-    }
-    let files = recorded.infos.iter().map(|info| Ok(info.path.canonicalize()?.display().to_string().into()));
-    let files = files.collect::<std::io::Result<Vec<Value>>>()?;
-    let topics = played.topics.iter().map(|topic| topic.as_str().into()).collect();
-    let pair = |(topic, stream): (&String, &String)| Value::Array(vec![topic.as_str().into(), stream.as_str().into()]);
-    let into = played.into.iter().map(pair).collect();
-    let mut whole = recorded.infos[0].clone();
-    (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
-    let part = arguments.part.of(&whole, &[]);
-    if let (Some(from_ns), Some(until_ns)) = (part.from_ns, part.until_ns)
-        && from_ns >= until_ns
-    {
-        return Err("the time range is empty: --until is not behind --from".into());
-    }
-    if part.from_ns.is_some_and(|from_ns| from_ns > recorded.end_ns)
-        || part.until_ns.is_some_and(|until_ns| until_ns <= recorded.begin_ns)
-    {
-        let seconds = recorded.end_ns.saturating_sub(recorded.begin_ns) as f64 / 1e9;
-        return Err(format!("nothing lies between --from and --until; the recording lasts {seconds:.1} s").into());
-    }
-    let ns = |ns: u64| i64::try_from(ns).map(Value::Integer).map_err(|_| format!("{ns} ns is beyond the year 2262"));
-    let mut settings = Table::new();
-    for (key, value) in [
-        ("files", Value::Array(files)),
-        ("begin-ns", ns(recorded.begin_ns)?),
-        ("end-ns", ns(recorded.end_ns)?),
-        ("described", Value::Array(described)),
-        ("topics", Value::Array(topics)),
-        ("into", Value::Array(into)),
-        ("rate", arguments.rate.into()),
-        ("repeats", arguments.repeats.into()),
-    ] {
-        settings.insert(key.into(), value);
-    }
-    for (key, time) in [("from-ns", part.from_ns), ("until-ns", part.until_ns)] {
-        if let Some(time) = time {
-            settings.insert(key.into(), ns(time)?);
-        }
-    }
-    Ok(settings)
 }

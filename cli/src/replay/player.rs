@@ -13,6 +13,7 @@
 use super::answers::PlayedAnswers;
 use super::channels::PlayedChannels;
 use super::course::{Course, Move, Part};
+use super::settings::{PlayerSettings, ROUND_MIN};
 use super::spacing::{PlayedAt, ProcessorWaits, Spacing};
 use nix::sys::time::TimeSpec;
 use nix::sys::timer::{Expiration, TimerSetTimeFlags};
@@ -26,8 +27,6 @@ use rohrpost::{
 };
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_recording::{Player, RecordedChannel};
-use serde::Deserialize;
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -42,31 +41,6 @@ const TOLD: Duration = Duration::from_millis(200);
 const SOON: Duration = Duration::from_nanos(1);
 /// The largest rate: that of a node's time.
 pub(super) const RATE_MAX: f64 = 1000.0;
-
-/// What `rohrpost replay` writes into the configuration of its node.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-struct PlayerSettings {
-    /// The recording, in order.
-    files: Vec<PathBuf>,
-    /// Its begin and its end, ns since 1970.
-    begin_ns: u64,
-    end_ns: u64,
-    /// Names that it stands in for, and files with their descriptions.
-    described: Vec<(String, String)>,
-    /// What it plays.
-    topics: BTreeSet<String>,
-    /// Topics of another program, and those in which their messages are played as bytes.
-    into: Vec<(String, String)>,
-    /// The file with the answers of modules.
-    answers: Option<String>,
-    /// Times the recorded speed.
-    rate: f64,
-    from_ns: Option<u64>,
-    until_ns: Option<u64>,
-    #[serde(default)]
-    repeats: bool,
-}
 
 pub(crate) fn run(start: Start) -> Result<(), StartError> {
     rohrpost_modules::runtime::run_started::<RecordingPlayer>(start)
@@ -85,6 +59,7 @@ struct RecordingPlayer {
     spacing: Spacing,
     waits: ProcessorWaits,
     damages: u64,
+    round_began: Instant,
     /// What was published of its position, and when.
     told: Option<(ReplayPosition, Instant)>,
 }
@@ -108,7 +83,7 @@ impl Module for RecordingPlayer {
         let answers = answers.transpose()?.map(|bytes| from_bytes(&bytes)).transpose()?;
         let answers = answers.map(PlayedAnswers::new).unwrap_or_default();
         let PlayerSettings { files, begin_ns, end_ns, rate, from_ns, until_ns, repeats, .. } = settings;
-        let files = files.iter().map(|file| context.installation().resolve(file)).collect();
+        let files = files.into_iter().map(PathBuf::from).collect();
         let topics = channels.topics();
         let plays = move |channel: &RecordedChannel| !channel.is_drawn() && topics.contains(channel.topic.as_str());
         let course = Course::new(Player::new(files, plays), Part { from_ns, until_ns, repeats })?;
@@ -127,6 +102,7 @@ impl Module for RecordingPlayer {
             spacing: Spacing::default(),
             waits: ProcessorWaits::of_this_thread(),
             damages: 0,
+            round_began: Instant::now(),
             told: None,
         })
     }
@@ -188,7 +164,7 @@ impl RecordingPlayer {
                 Move::Play { time_ns, channel, message } => {
                     if let Some(time_ns) = time_ns {
                         self.time.advance_to(time_ns);
-                    } else {
+                    } else if !channel.is_repeated() {
                         let late_ns = (now_ns.saturating_sub(message.arrival_ns) as f64 / self.rate) as u64;
                         let at = PlayedAt { arrival_ns: message.arrival_ns, now_ns: monotonic_ns(), late_ns };
                         self.spacing.note(at, self.rate, self.waits.waited_ns());
@@ -197,6 +173,13 @@ impl RecordingPlayer {
                 }
                 Move::Advance { time_ns } => drop(self.time.advance_to(time_ns)),
                 Move::Wait { until_ns } => return Ok(Some(self.left(until_ns))),
+                Move::Round => {
+                    let left = ROUND_MIN.saturating_sub(self.round_began.elapsed());
+                    self.round_began = Instant::now() + left;
+                    if !left.is_zero() {
+                        return Ok(Some(left));
+                    }
+                }
                 Move::End if is_paused => {
                     tracing::info!("at the end: `seek`, or `resume` to end the replay")
                 }
@@ -271,6 +254,7 @@ impl Replay for RecordingPlayer {
             ended: self.course.has_ended(),
             rounds: self.course.rounds(),
             played: self.channels.played,
+            older: self.channels.older,
             channels: self.channels.count(),
             refused: self.channels.refused,
             damages: self.damages,

@@ -4,7 +4,7 @@ use crate::terminal::Failure;
 use rohrpost::schema::Description;
 use rohrpost_modules::journal::JOURNAL_NAME;
 use rohrpost_recording::format::{MESSAGE_ENCODING, PROFILE, session_key};
-use rohrpost_recording::{DescribedModule, Info, info, recovered_path};
+use rohrpost_recording::{ChannelInfo, DescribedModule, Info, info, recovered_path};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -35,7 +35,7 @@ impl RecordedFiles {
         let infos = files.into_iter().map(|file| info(file)).collect::<Result<Vec<Info>, _>>()?;
         in_order(&infos)?;
         let are_others = are_others(&infos)?;
-        let is_old = |info: &&Info| !are_others && info.messages > 0 && info.described.is_empty();
+        let is_old = |info: &&Info| !are_others && info.begins_ns.is_some() && info.described.is_empty();
         if let Some(old) = infos.iter().find(is_old) {
             return Err(format!(
                 "{}: does not describe its modules, as it was recorded by an older version; nobody can stand in for \
@@ -44,8 +44,8 @@ impl RecordedFiles {
             )
             .into());
         }
-        let begin_ns = infos.iter().filter_map(|info| info.first_ns).min();
-        let end_ns = infos.iter().filter_map(|info| info.last_ns).max();
+        let begin_ns = infos.iter().filter_map(|info| info.begins_ns).min();
+        let end_ns = infos.iter().filter_map(|info| info.last_ns.or(info.begins_ns)).max();
         let (Some(begin_ns), Some(end_ns)) = (begin_ns, end_ns) else {
             return Err("there is no message in these files; name others (`rohrpost record info FILE`)".into());
         };
@@ -85,13 +85,13 @@ impl RecordedFiles {
     /// Topics that can be played: recorded with the types that these descriptions say.
     pub(super) fn topics(&self, described: &BTreeMap<String, Description>) -> BTreeSet<String> {
         let channels = || self.infos.iter().flat_map(|info| &info.channels);
-        let fits = |channel: &&rohrpost_recording::ChannelInfo| {
+        let fits = |channel: &&ChannelInfo| {
             let item =
                 described.get(channel.name.as_str()).and_then(|description| description.data_item(&channel.item));
             let types = item.map(|item| &item.field.ty).zip(channel.ty.as_ref());
             channel.message_encoding == MESSAGE_ENCODING && types.is_some_and(|(one, other)| one.hash() == other.hash())
         };
-        let with_messages = || channels().filter(|channel| channel.messages > 0 && channel.drawn_of.is_none());
+        let with_messages = || channels().filter(|channel| has_messages(channel));
         let other: BTreeSet<&str> =
             with_messages().filter(|channel| !fits(channel)).map(|channel| channel.topic.as_str()).collect();
         let topics = with_messages().map(|channel| channel.topic.as_str());
@@ -101,10 +101,7 @@ impl RecordedFiles {
     /// All topics with messages, but for what was drawn of others.
     pub(super) fn all_topics(&self) -> BTreeSet<&str> {
         let channels = self.infos.iter().flat_map(|info| &info.channels);
-        channels
-            .filter(|channel| channel.messages > 0 && channel.drawn_of.is_none())
-            .map(|channel| channel.topic.as_str())
-            .collect()
+        channels.filter(|channel| has_messages(channel)).map(|channel| channel.topic.as_str()).collect()
     }
 
     /// Modules with a journal.
@@ -137,6 +134,11 @@ impl RecordedFiles {
     pub(super) fn text(&self, name: &str) -> Option<&str> {
         self.infos.iter().rev().find_map(|info| info.configuration.get(name)).map(String::as_str)
     }
+}
+
+/// Whether there is something to play, and be it what the file repeats of earlier ones. What was drawn is not played.
+fn has_messages(channel: &ChannelInfo) -> bool {
+    (channel.messages > 0 || channel.repeated > 0) && channel.drawn_of.is_none()
 }
 
 /// Files without those of which a whole one was recovered, if that is named too: `main-*.mcap` means each message once.

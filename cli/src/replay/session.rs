@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 /// Functions of the player that are called, by their numbers.
 const POSITION: u16 = 16;
+const PAUSE: u16 = 17;
 const RESUME: u16 = 18;
 /// Modules that run have subscribed by then, or they do not.
 const LISTENING: Duration = Duration::from_secs(3);
@@ -63,7 +64,7 @@ impl ReplaySession {
     ) -> Result<(), Failure> {
         let mut view = TerminalView::new(is_quiet, speech);
         let (began, mut look_at, mut settled_at) = (Instant::now(), Instant::now(), None::<Instant>);
-        let mut is_held = !stays_paused;
+        let mut is_held = true;
         while launch.watch(view.wait().min(LOOK)) {
             view.show(launch)?;
             let now = Instant::now();
@@ -74,10 +75,13 @@ impl ReplaySession {
                 continue;
             }
             look_at = now + LOOK;
-            if is_held && (now >= began + LISTENING || self.all_listen(launch)) {
-                is_held = self.call::<()>(launch, RESUME).is_err();
-            }
             self.look(launch);
+            // Somebody else may have resumed it.
+            is_held &= self.resumed.is_none();
+            if is_held && (now >= began + LISTENING || self.all_listen(launch)) {
+                let go = if stays_paused { PAUSE } else { RESUME };
+                is_held = self.call::<()>(launch, go).is_err();
+            }
             if self.took.is_some() {
                 settled_at = Some(if self.has_running { now + SETTLE } else { now });
             }
@@ -125,6 +129,9 @@ impl ReplaySession {
         let mut text = format!("played {played} values of {channels} channel{plural} in {seconds:.1} s");
         if !position.ended {
             text.push_str(&format!(", to {:.1} s of {:.1} s", position.at_s, position.length_s));
+        }
+        if position.older > 0 {
+            text.push_str(&format!(", and {} from before its beginning", position.older));
         }
         text.push('\n');
         let rate = position.rate;

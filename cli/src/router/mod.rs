@@ -22,6 +22,7 @@ use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Parts, ReplicaParts, Shell};
 use rohrpost_routers::time::Role;
 use serde::Deserialize;
+use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,7 +37,7 @@ pub(super) struct Arguments {
     /// The arguments of every module: --config FILE --name router.I [--off]; I is the place of its node in the
     /// configuration, from 0.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    arguments: Vec<String>,
+    arguments: Vec<OsString>,
 }
 
 pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {

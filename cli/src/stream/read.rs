@@ -5,7 +5,7 @@ use super::moment::{StreamMoment, parse_moment};
 use super::output::{RecordForm, RecordOutput};
 use super::refusal::around_or_refusal;
 use crate::terminal::Failure;
-use crate::units::{LOOK, Stop, seconds};
+use crate::units::{LOOK, Stop, seconds, size_argument};
 use rohrpost::Name;
 use rohrpost_mailbox::{Next, Participant, Stamp, StreamInfo, StreamReader};
 use std::path::PathBuf;
@@ -50,8 +50,8 @@ pub(super) struct ReadArguments {
     #[arg(long)]
     hex: bool,
     /// Print at most this many bytes as hex: of a record, in JSON of a field of bytes; 0 prints all.
-    #[arg(long, default_value_t = RecordForm::BYTES_MAX, value_name = "N")]
-    bytes: usize,
+    #[arg(long, default_value_t = RecordForm::BYTES_MAX as u32, value_name = "SIZE", value_parser = size_argument)]
+    bytes: u32,
     /// One JSON object a record, with its value; without a description, with all of its bytes.
     #[arg(long)]
     json: bool,
@@ -60,7 +60,7 @@ pub(super) struct ReadArguments {
 pub(super) fn run(arguments: &ReadArguments) -> Result<ExitCode, Failure> {
     let chosen = arguments.stream.find()?;
     let info = chosen.inspect()?;
-    let form = RecordForm::new(arguments.json, arguments.bytes);
+    let form = RecordForm::new(arguments.json, arguments.bytes as usize);
     let participant = Participant::join(&chosen.running.node, Name::NONE)?;
     let reader = participant.stream_reader(chosen.id).map_err(|error| chosen.failure(&error))?;
     // Last: a file is made anew only when there is a stream to read.

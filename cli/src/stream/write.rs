@@ -3,7 +3,7 @@
 use super::choice::{ChosenStream, StreamChoice};
 use super::stamp::{parse_stamp, stamp_text};
 use crate::terminal::{Failure, complain, say};
-use crate::units::{Stop, seconds};
+use crate::units::{Stop, seconds, size_argument};
 use rohrpost::Name;
 use rohrpost_mailbox::{Participant, Stamp, StreamShape, SystemClock};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use std::time::Duration;
 #[command(after_help = "Examples:
   rohrpost stream write camera.0 1 left.jpg
   rohrpost stream write camera.0 1 frames/*.jpg --delay 0.1
-  rohrpost stream write camera.0 1 big.raw --record 8388608 --keep 4
+  rohrpost stream write camera.0 1 big.raw --record 8MiB --keep 4
 A stream that is there goes on in its shape; another shape makes it anew, without its records. It stays when this \
 program ends.")]
 pub(super) struct WriteArguments {
@@ -29,8 +29,9 @@ pub(super) struct WriteArguments {
     /// Stamp of the first record, seconds of system time; each next one is later by --delay. Default: now, of each.
     #[arg(long, value_name = "STAMP", value_parser = parse_stamp)]
     stamp: Option<u64>,
-    /// Largest record, bytes; default: as the stream has it, else 1024, or as the largest file.
-    #[arg(long, value_name = "BYTES")]
+    /// Largest record: bytes, or with a unit, as 8MiB; default: as the stream has it, else 1 KiB, or as the largest
+    /// file.
+    #[arg(long, value_name = "SIZE", value_parser = size_argument)]
     record: Option<u32>,
     /// Records that are kept; default: as the stream has it, else 64.
     #[arg(long, value_name = "N")]
@@ -156,7 +157,7 @@ mod tests {
         let all = ["--record", "16", "--keep", "2", "--readers", "1", "--late", "0.5"];
         let asked = StreamShape { record_bytes: 16, keep: 2, readers: 1, late: Duration::from_millis(500) };
         assert_eq!(shaped(&all, Some(there), 10), Ok(asked));
-        for (options, there) in [(&[][..], Some(there)), (&["--record", "2048"], None)] {
+        for (options, there) in [(&[][..], Some(there)), (&["--record", "2KiB"], None)] {
             let told = shaped(options, there, 5000).unwrap_err();
             assert_eq!(told, "the largest file has 5000 bytes, and a record 2048 at most; raise --record");
         }

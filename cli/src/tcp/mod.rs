@@ -8,6 +8,7 @@ mod server;
 use crate::terminal::Failure;
 use rohrpost::Start;
 use rohrpost_modules::runtime::{exit, run_started};
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -20,7 +21,7 @@ pub(super) struct Arguments {
     /// The arguments of every module: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the
     /// clients of the nodes.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    arguments: Vec<String>,
+    arguments: Vec<OsString>,
 }
 
 /// Runs the server.

@@ -50,10 +50,10 @@ impl NodeObject {
     }
 
     /// By a configuration: its node of this name, or that of this module, under the module's name or none.
-    fn configured(file: &str, node: Option<&str>, module: Option<&str>, is_module: bool) -> Result<Self, Code> {
-        let installation = Arc::new(Installation::load(Path::new(file)).map_err(failed)?);
+    fn configured(file: &Path, node: Option<&str>, module: Option<&str>, is_module: bool) -> Result<Self, Code> {
+        let installation = Arc::new(Installation::load(file).map_err(failed)?);
         let module = module.map(|text| installation.classes.parse_module(text)).transpose().map_err(failed)?;
-        let lacks = |what: &str| say(Code::Configuration, format_args!("{file}: {what}"));
+        let lacks = |what: &str| say(Code::Configuration, format_args!("{}: {what}", file.display()));
         let of_module = || installation.node_of(module?);
         let name = node.or_else(of_module).ok_or_else(|| lacks("name a node, or a module that it has"))?;
         let found = installation.node(name).ok_or_else(|| lacks(&format!("there is no node `{name}`")))?;
@@ -97,13 +97,13 @@ fn open(
 pub extern "C" fn rohrpost_node_open(node: Option<&mut MaybeUninit<NodeHandle>>) -> Code {
     edge(|| {
         open(node, || {
-            let [config, module] = LAUNCHED.map(|name| std::env::var(name).ok());
-            let (Some(config), Some(module)) = (config, module) else {
+            let [config, module] = LAUNCHED.map(std::env::var_os);
+            let (Some(config), Some(module)) = (config, module.and_then(|module| module.into_string().ok())) else {
                 let [config, module] = LAUNCHED;
                 let words = format_args!("{config} and {module} are not set: launch did not start this process");
                 return Err(say(Code::Configuration, words));
             };
-            NodeObject::configured(&config, None, Some(&module), false)
+            NodeObject::configured(Path::new(&config), None, Some(&module), false)
         })
     })
 }
@@ -126,7 +126,7 @@ pub unsafe extern "C" fn rohrpost_node_open_configured(
         // SAFETY: the caller's promise of all three.
         let (config, name, module) =
             unsafe { (needed_text(config, "config")?, text(node_name, "node_name")?, text(module, "module")?) };
-        open(node, || NodeObject::configured(config, name, module, true))
+        open(node, || NodeObject::configured(Path::new(config), name, module, true))
     })
 }
 

@@ -2,8 +2,10 @@
 
 use crate::error::{ReadError, RewriteError};
 use crate::format::{header_of_made, metadata};
-use crate::read::before::newest_before;
+use crate::newest::KEPT_BYTES_MAX;
+use crate::read::before::{EarlierMessage, PartStart, newest_before};
 use crate::read::contents::Contents;
+use crate::read::definitions::Definition;
 use crate::read::selected::Selected;
 use crate::rewrite::{Progress, Rewriter};
 use crate::selection::{SelectError, Selection};
@@ -54,11 +56,16 @@ pub fn cut(path: &Path, to: &Path, selection: &Selection, progress: &mut Progres
         new.channel(SELECTED, id, channel).map_err(RewriteError::from)?;
     }
     let mut next = selected.next()?;
-    let begins_ns = next.as_ref().map(|found| found.header.log_time).or(selection.from_ns);
-    for earlier in newest_before(path, selection)? {
-        let log_time = begins_ns.unwrap_or(earlier.header.log_time);
-        let header = MessageHeader { log_time, ..earlier.header };
-        new.message(EARLIER, &earlier.channel, &header, &earlier.data).map_err(RewriteError::from)?;
+    if let Some(from_ns) = selection.from_ns {
+        let epoch = next.as_ref().map_or(u64::MAX, |found| found.channel.epoch().unwrap_or_default());
+        let is_selected = |channel: &Definition| selection.has_channel(channel);
+        let earlier = newest_before(path, &is_selected, PartStart { epoch, from_ns }, KEPT_BYTES_MAX)?;
+        earlier.unread.map_or(Ok(()), Err)?;
+        let log_time = next.as_ref().map_or(from_ns, |found| found.header.log_time);
+        for EarlierMessage { channel, header, data } in earlier.messages {
+            let header = MessageHeader { log_time, ..header };
+            new.message(EARLIER, &channel, &header, &data).map_err(RewriteError::from)?;
+        }
     }
     while let Some(found) = next {
         progress(selected.at(), selected.file_bytes());

@@ -46,6 +46,8 @@ pub struct Info {
     pub repeated: u64,
     /// Messages that should be in it, and are not.
     pub lost: u64,
+    /// When what it begins with is played, in nanoseconds of system time: also what is repeated.
+    pub begins_ns: Option<u64>,
     /// When the first message came, in nanoseconds of system time.
     pub first_ns: Option<u64>,
     /// When the last one came; not before the first.
@@ -217,6 +219,7 @@ fn from_index(mut frames: Frames, index: Index) -> Result<Info, ReadError> {
     info.chunks = chunks.len() as u64;
     if info.messages > 0 {
         info.first_ns = Some(statistics.message_start_time);
+        info.begins_ns = info.first_ns;
         info.last_ns = Some(statistics.message_end_time);
     }
     Ok(info)
@@ -267,6 +270,7 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
         messages: 0,
         repeated: 0,
         lost: 0,
+        begins_ns: None,
         first_ns: None,
         last_ns: None,
         channels: Vec::new(),
@@ -306,7 +310,7 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
     let mut channels: Vec<ChannelInfo> = Vec::new();
     let mut places: BTreeMap<ChannelIdentity<'_>, usize> = BTreeMap::new();
     let mut epochs: BTreeMap<u64, Tally> = BTreeMap::new();
-    let mut times = None;
+    let (mut times, mut all_times) = (None, None);
     for (id, channel) in definitions.channels() {
         let tally = tallies.get(&id);
         let (messages, its_times) = tally.map_or((0, None), |tally| (tally.messages, tally.times));
@@ -316,6 +320,7 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
         }
         let told = &mut channels[place];
         describe(told, channel);
+        all_times = wider(all_times, its_times);
         if channel.is_repeated() {
             told.repeated = told.repeated.saturating_add(messages);
             continue;
@@ -339,6 +344,7 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
         channels[at].lost = *count;
     }
     (info.first_ns, info.last_ns) = times.unzip();
+    info.begins_ns = all_times.map(|(first_ns, _)| first_ns);
     info.lost = sum(lost.values().copied());
     info.channels = channels;
     info.messages = sum(info.channels.iter().map(|channel| channel.messages));

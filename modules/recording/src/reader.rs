@@ -259,7 +259,8 @@ impl ReaderSource {
     }
 }
 
-fn recorded(channel: &Definition) -> RecordedChannel {
+/// As it is told to users.
+pub(crate) fn recorded(channel: &Definition) -> RecordedChannel {
     let text = |key: &str| channel.texts.get(key).map(|text| text.as_str().into()).unwrap_or_default();
     RecordedChannel {
         topic: channel.topic.as_str().into(),

@@ -29,6 +29,9 @@ pub struct ReplayPosition {
     /// Values played.
     #[schema(unit = "messages")]
     pub played: u64,
+    /// Besides, values from before the place where it began, or was sought: the newest one of each channel.
+    #[schema(unit = "messages")]
+    pub older: u64,
     /// Channels that they were of.
     pub channels: u32,
     /// Values that their stream did not take: too large, or too late.
@@ -106,6 +109,7 @@ pub trait Replay {
     fn step_by(&mut self, seconds: f64) -> Result<(), ReplayRefusal>;
 
     /// Goes to what arrived so many seconds after the recording's begin, or next behind that; with an epoch of its own.
+    /// The newest value of each channel from before is played first, with its stamp.
     #[command(22, idempotent)]
     fn seek(&mut self, seconds: f64) -> Result<(), ReplayRefusal>;
 

@@ -5,6 +5,7 @@ use super::error::NotStarted;
 use crate::runtime::environment;
 use rohrpost_config::{Installation, Module};
 use rohrpost_mailbox::{Node, NodeError, ParticipantInfo, ParticipantProcess, ProcessError};
+use std::os::unix::ffi::OsStrExt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -129,7 +130,7 @@ pub(super) fn note_config(
     resolved: &[u8],
 ) -> Result<(), NodeError> {
     let path = installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone());
-    let config = format!("{}\n{node_name}\n", path.display());
-    node.put_file(CONFIG_FILE, config.as_bytes())?;
+    let config = [path.as_os_str().as_bytes(), b"\n", node_name.as_bytes(), b"\n"].concat();
+    node.put_file(CONFIG_FILE, &config)?;
     node.put_file(RESOLVED_FILE, resolved)
 }

@@ -126,13 +126,13 @@ impl Orders<'_> {
         child.ok_or_else(|| ControlError::NoModule(module.into()))
     }
 
-    /// Starts a module; one that runs is ended first, one that was left out needs its program by now. The number of the
-    /// process that is to come.
+    /// Starts a module, if its program is there; one that runs is ended first. The number of the process that is to
+    /// come.
     fn begin_anew(&mut self, module: &str) -> Result<u32, ControlError> {
         let (node, installation) = (self.node, self.installation);
         let child = self.find(module)?;
         let was_left_out = child.phase() == Phase::LeftOut;
-        if was_left_out && let Some(configured) = installation.module(child.name()) {
+        if let Some(configured) = installation.module(child.name()) {
             child.program().look_again(configured, installation).map_err(|missing| ControlError::NoProgram {
                 module: child.text().into(),
                 program: missing.program,

@@ -24,6 +24,7 @@ use rohrpost_mailbox::{
 };
 use rohrpost_schema::Description;
 use serde::de::DeserializeOwned;
+use std::ffi::OsString;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -89,16 +90,16 @@ impl Start {
     /// # Errors
     /// Usage, configuration, or an unknown module.
     pub fn from_environment() -> Result<Self, StartError> {
-        Self::from_arguments(std::env::args().skip(1))
+        Self::from_arguments(std::env::args_os().skip(1))
     }
 
     /// The same, with arguments that the caller has.
     ///
     /// # Errors
     /// As for [`Start::from_environment`].
-    pub fn from_arguments(arguments: impl Iterator<Item = String>) -> Result<Self, StartError> {
+    pub fn from_arguments(arguments: impl Iterator<Item: Into<OsString>>) -> Result<Self, StartError> {
         let variable = |name| std::env::var(name).ok();
-        let (mut config, mut module) = (variable(environment::CONFIG), variable(environment::MODULE));
+        let (mut config, mut module) = (std::env::var_os(environment::CONFIG), std::env::var_os(environment::MODULE));
         let launcher = variable(environment::LAUNCHER).and_then(|pid| pid.parse().ok());
         let restarts = variable(environment::RESTARTS).and_then(|count| count.parse().ok()).unwrap_or(0);
         let mut off = std::env::var_os(environment::OFF).is_some();
@@ -108,22 +109,24 @@ impl Start {
             let (installation, name) = run.installation()?;
             return Ok(Self { installation: Arc::new(installation), name, launcher: None, restarts: 0, off: true });
         }
-        let mut arguments = arguments;
+        let mut arguments = arguments.map(Into::<OsString>::into);
         while let Some(argument) = arguments.next() {
-            let mut value = || arguments.next().ok_or_else(|| StartError::Usage(format!("`{argument}` needs a value")));
-            match argument.as_str() {
-                "--config" => config = Some(value()?),
-                "--name" => module = Some(value()?),
-                "--off" => off = true,
+            let shown = argument.display();
+            let mut value = || arguments.next().ok_or_else(|| StartError::Usage(format!("`{shown}` needs a value")));
+            match argument.to_str() {
+                Some("--config") => config = Some(value()?),
+                Some("--name") => module = Some(value()?),
+                Some("--off") => off = true,
                 // Launch's own arguments of a program come after its environment; they are the module's business.
                 _ if launcher.is_some() => {}
-                other => return Err(StartError::Usage(format!("unknown argument `{other}`"))),
+                _ => return Err(StartError::Usage(format!("unknown argument `{shown}`"))),
             }
         }
         let config = config.ok_or_else(|| StartError::Usage("which configuration?".into()))?;
         let module = module.ok_or_else(|| StartError::Usage("which module of it?".into()))?;
         let installation = Installation::load(Path::new(&config))?;
-        let name = installation.classes.parse_module(&module)?;
+        // A name that is no text is none of the configuration.
+        let name = installation.classes.parse_module(&module.to_string_lossy())?;
         Ok(Self { installation: Arc::new(installation), name, launcher, restarts, off })
     }
 

@@ -20,7 +20,7 @@ const CHANNELS: [(&str, &str, &str, &str); 4] = [
 ];
 
 /// Forty messages, a microsecond apart, of all channels in turn.
-fn write(path: &Path, options: WriteOptions) {
+pub(super) fn write(path: &Path, options: WriteOptions) {
     let mut writer = options.profile("ros2").library("other 1.0").create(std::fs::File::create(path).unwrap()).unwrap();
     let ids = CHANNELS.map(|(topic, name, schema_encoding, encoding)| {
         let schema = if name.is_empty() { 0 } else { writer.add_schema(name, schema_encoding, b"text").unwrap() };

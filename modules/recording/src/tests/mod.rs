@@ -16,6 +16,7 @@ mod merging;
 mod moved;
 mod ordered;
 mod playing;
+mod sought;
 mod support;
 mod telling;
 mod written;

@@ -1,0 +1,170 @@
+//! The settings of the player: `rohrpost replay` writes them into the configuration of its node.
+
+use super::configuration::PlayedModules;
+use super::recorded::RecordedFiles;
+use crate::record::PartArguments;
+use crate::terminal::{Failure, say};
+use rohrpost_recording::Selection;
+use serde::Deserialize;
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::os::unix::ffi::OsStringExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use toml::{Table, Value};
+
+/// A round takes so long at least, also if what is repeated is shorter: rounds of no length would take a processor.
+pub(super) const ROUND_MIN: Duration = Duration::from_millis(100);
+
+/// What `rohrpost replay` writes into the configuration of its node.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct PlayerSettings {
+    /// The recording, in order.
+    pub(super) files: Vec<RecordingPath>,
+    /// Its begin and its end, ns since 1970.
+    pub(super) begin_ns: u64,
+    pub(super) end_ns: u64,
+    /// Names that it stands in for, and files with their descriptions.
+    pub(super) described: Vec<(String, String)>,
+    /// What it plays.
+    pub(super) topics: BTreeSet<String>,
+    /// Topics of another program, and those in which their messages are played as bytes.
+    pub(super) into: Vec<(String, String)>,
+    /// The file with the answers of modules.
+    pub(super) answers: Option<String>,
+    /// Times the recorded speed.
+    pub(super) rate: f64,
+    pub(super) from_ns: Option<u64>,
+    pub(super) until_ns: Option<u64>,
+    #[serde(default)]
+    pub(super) repeats: bool,
+}
+
+/// Where a recording is. Names of files are bytes, and configurations are texts: of a name that is no text they have
+/// the numbers of its bytes.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(untagged)]
+pub(super) enum RecordingPath {
+    Text(String),
+    Bytes(Vec<u8>),
+}
+
+impl From<PathBuf> for RecordingPath {
+    fn from(path: PathBuf) -> Self {
+        path.into_os_string().into_string().map_or_else(|name| Self::Bytes(name.into_vec()), Self::Text)
+    }
+}
+
+impl From<RecordingPath> for PathBuf {
+    fn from(path: RecordingPath) -> Self {
+        match path {
+            RecordingPath::Text(text) => text.into(),
+            RecordingPath::Bytes(bytes) => OsString::from_vec(bytes).into(),
+        }
+    }
+}
+
+impl From<RecordingPath> for Value {
+    fn from(path: RecordingPath) -> Self {
+        match path {
+            RecordingPath::Text(text) => text.into(),
+            RecordingPath::Bytes(bytes) => bytes.into_iter().map(i64::from).collect::<Vec<_>>().into(),
+        }
+    }
+}
+
+/// What the command line says of the course.
+pub(super) struct WantedCourse<'a> {
+    pub(super) part: &'a PartArguments,
+    pub(super) rate: f64,
+    pub(super) repeats: bool,
+}
+
+/// The player's settings, and files with the descriptions.
+pub(super) fn made(
+    course: &WantedCourse<'_>,
+    recorded: &RecordedFiles,
+    played: &PlayedModules,
+    folder: &Path,
+) -> Result<Table, Failure> {
+    let mut described = Vec::new();
+    for (name, description) in &played.described {
+        let file = format!("{name}.description");
+        std::fs::write(folder.join(&file), description.to_bytes())?;
+        described.push(Value::Array(vec![name.as_str().into(), file.into()]));
+    }
+    let files = recorded.infos.iter().map(|info| Ok(RecordingPath::from(info.path.canonicalize()?).into()));
+    let files = files.collect::<std::io::Result<Vec<Value>>>()?;
+    let topics = played.topics.iter().map(|topic| topic.as_str().into()).collect();
+    let pair = |(topic, stream): (&String, &String)| Value::Array(vec![topic.as_str().into(), stream.as_str().into()]);
+    let into = played.into.iter().map(pair).collect();
+    let mut whole = recorded.infos[0].clone();
+    (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
+    let part = course.part.of(&whole, &[]);
+    if let (Some(from_ns), Some(until_ns)) = (part.from_ns, part.until_ns)
+        && from_ns >= until_ns
+    {
+        return Err("the time range is empty: --until is not behind --from".into());
+    }
+    if part.from_ns.is_some_and(|from_ns| from_ns > recorded.end_ns)
+        || part.until_ns.is_some_and(|until_ns| until_ns <= recorded.begin_ns)
+    {
+        let seconds = recorded.end_ns.saturating_sub(recorded.begin_ns) as f64 / 1e9;
+        return Err(format!("nothing lies between --from and --until; the recording lasts {seconds:.1} s").into());
+    }
+    if course.repeats {
+        note_short_rounds(recorded, played, &part);
+    }
+    let ns = |ns: u64| i64::try_from(ns).map(Value::Integer).map_err(|_| format!("{ns} ns is beyond the year 2262"));
+    let mut settings = Table::new();
+    for (key, value) in [
+        ("files", Value::Array(files)),
+        ("begin-ns", ns(recorded.begin_ns)?),
+        ("end-ns", ns(recorded.end_ns)?),
+        ("described", Value::Array(described)),
+        ("topics", Value::Array(topics)),
+        ("into", Value::Array(into)),
+        ("rate", course.rate.into()),
+        ("repeats", course.repeats.into()),
+    ] {
+        settings.insert(key.into(), value);
+    }
+    for (key, time) in [("from-ns", part.from_ns), ("until-ns", part.until_ns)] {
+        if let Some(time) = time {
+            settings.insert(key.into(), ns(time)?);
+        }
+    }
+    Ok(settings)
+}
+
+/// Says how long a round takes if that is longer than what is repeated.
+fn note_short_rounds(recorded: &RecordedFiles, played: &PlayedModules, part: &Selection) {
+    let channels = recorded.infos.iter().flat_map(|info| &info.channels);
+    let is_played = |topic: &str| played.topics.contains(topic) || played.into.contains_key(topic);
+    let times = channels.filter(|its| is_played(&its.topic)).filter_map(|its| its.first_ns.zip(its.last_ns));
+    let (first_ns, last_ns) = times.fold((u64::MAX, 0), |(first, last), its| (first.min(its.0), last.max(its.1)));
+    let begin_ns = first_ns.max(part.from_ns.unwrap_or_default());
+    let end_ns = part.until_ns.filter(|until_ns| *until_ns <= last_ns).unwrap_or(last_ns);
+    let lasts = Duration::from_nanos(end_ns.saturating_sub(begin_ns));
+    if lasts < ROUND_MIN {
+        say(format_args!("--loop: what is repeated lasts {lasts:?}; each round takes {ROUND_MIN:?} at least"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_may_have_any_name() {
+        for name in [&b"main-0001.mcap"[..], b"T\xfcr.mcap", b"\xff", "T\u{fc}r.mcap".as_bytes()] {
+            let path = PathBuf::from(OsString::from_vec(name.to_vec()));
+            let written =
+                toml::to_string(&Table::from_iter([("file".to_owned(), RecordingPath::from(path.clone()).into())]));
+            let mut read: std::collections::BTreeMap<String, RecordingPath> =
+                toml::from_str(&written.unwrap()).unwrap();
+            assert_eq!(PathBuf::from(read.remove("file").unwrap()), path);
+        }
+    }
+}
