@@ -76,6 +76,8 @@ pub struct Context {
     pub(crate) watches: Option<Watches>,
     /// Descriptors of `open_outside`, if there is a journal.
     outside: Vec<OpenedFile>,
+    /// Nothing that came is left behind at its end.
+    pub(super) takes_all_at_end: bool,
     /// When ticks and periods are due.
     pub(crate) schedule: Schedule,
     scratch: Vec<u8>,
@@ -118,6 +120,7 @@ impl Context {
             open: Vec::new(),
             watches: None,
             outside: Vec::new(),
+            takes_all_at_end: false,
             schedule,
             scratch: Vec::new(),
         }
