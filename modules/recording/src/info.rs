@@ -4,6 +4,7 @@ use crate::damages::Damages;
 use crate::described::DescribedModule;
 use crate::error::{Damage, ReadError};
 use crate::format::{self, key, metadata};
+use crate::loss::Losses;
 use crate::order::Mark;
 use crate::read::contents::{Contents, Ending, Item};
 use crate::read::definitions::{Definition, Definitions};
@@ -46,6 +47,8 @@ pub struct Info {
     pub repeated: u64,
     /// Messages that should be in it, and are not.
     pub lost: u64,
+    /// Why they are not, as far as the file tells.
+    pub losses: Losses,
     /// When the first message came, in nanoseconds of system time.
     pub first_ns: Option<u64>,
     /// When the last one came; not before the first.
@@ -95,6 +98,8 @@ pub struct ChannelInfo {
     pub repeated: u64,
     /// Messages that should be here, and are not.
     pub lost: u64,
+    /// Why they are not, as far as the file tells.
+    pub losses: Losses,
     /// When the first one came.
     pub first_ns: Option<u64>,
     /// When the last one came.
@@ -238,6 +243,7 @@ fn build(
         messages: 0,
         repeated: 0,
         lost: 0,
+        losses: Losses::default(),
         first_ns: None,
         last_ns: None,
         channels: Vec::new(),
@@ -249,7 +255,7 @@ fn build(
         described: Vec::new(),
         others: Vec::new(),
     };
-    let (mut lost, mut memory) = (BTreeMap::new(), definitions.memory());
+    let (mut lost, mut losses, mut memory) = (BTreeMap::new(), BTreeMap::new(), definitions.memory());
     for its in about {
         let is_heeded = contents.heeds(&its);
         let Metadata { name, metadata: mut texts } = its;
@@ -258,6 +264,7 @@ fn build(
             metadata::SESSION if info.session.is_empty() => info.session = foreign(texts),
             metadata::CONFIGURATION => info.add_configuration(texts),
             metadata::LOST => lost = format::counts(&texts),
+            metadata::LOST_BY => losses = Losses::of_texts(&texts),
             metadata::CLOSED => info.closed_because = texts.remove("reason").map(ForeignText::from),
             // Epochs are told by the channels.
             metadata::EPOCH => {}
@@ -298,6 +305,8 @@ fn build(
         let channel = channels.entry(topic).or_default();
         channel.topic = topic.as_str().into();
         channel.lost = *count;
+        channel.losses = losses.get(topic).copied().unwrap_or_default();
+        info.losses += channel.losses;
     }
     (info.first_ns, info.last_ns) = times.unzip();
     info.lost = sum(lost.values().copied());
