@@ -127,25 +127,26 @@ fn what_finds_no_room_is_blamed_on_the_disk_that_fails_and_poses_find_room_besid
     let free = Arc::new(AtomicU64::new(0));
     let options = Options { leave_bytes: 1, queue_chunks: 4, ..options(folder.path()) };
     let mut writer = Writer::start_on(Box::new(SmallDisk(free.clone())), options, session()).unwrap();
-    until("the problem is told", || writer.status().problem.is_some());
     let spec = |name: &'static str| ChannelSpec { name, item: "item", ty: &Type::Bytes, texts: BTreeMap::new() };
     let [pictures, poses] = ["camera.0", "mapper.0"].map(|name| writer.channel(&spec(name)).unwrap());
     let (picture, pose) = (vec![7; 230_400], [7; 29]);
+    let message = |sequence, data| Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence, data };
+    writer.write(poses, &message(0, &pose)).unwrap();
+    until("the problem is told", || writer.status().problem.is_some());
     let mut refused = 0;
-    for sequence in 0..200 {
-        let message = |data| Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence, data };
-        if let Err(error) = writer.write(pictures, &message(&picture)) {
+    for sequence in 1..200 {
+        if let Err(error) = writer.write(pictures, &message(sequence, &picture)) {
             assert_eq!(error, WriteError::Full(LossCause::Disk));
             refused += 1;
         }
-        writer.write(poses, &message(&pose)).unwrap();
+        writer.write(poses, &message(sequence, &pose)).unwrap();
     }
     assert!(refused > 150, "{refused}");
     free.store(1 << 30, Relaxed);
     until("what waits is written", || writer.status().waiting == 0);
     let (status, told) = writer.finish();
     told.unwrap();
-    assert_eq!((status.written + refused, status.losses[LossCause::Disk], status.lost), (400, refused, refused));
+    assert_eq!((status.written + refused, status.losses[LossCause::Disk], status.lost), (399, refused, refused));
     assert_eq!((status.channels[1].written, status.channels[1].lost), (200, 0));
     let told = info(files(folder.path()).last().unwrap()).unwrap();
     assert_eq!((told.lost, told.losses), (refused, status.losses));
