@@ -68,6 +68,7 @@ mod replicated;
 mod saved;
 mod scheduling;
 mod settings;
+mod stopping;
 mod stream;
 mod tcp;
 mod tdma;

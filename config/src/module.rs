@@ -38,11 +38,6 @@ pub const SPIN_MAX: Duration = Duration::from_millis(1);
 /// See [`Module::busy_after`].
 pub(crate) const BUSY_AFTER: Duration = Duration::from_secs(1);
 
-/// See [`Module::stop_within`].
-const STOP_WITHIN: Duration = Duration::from_secs(2);
-/// Of a recorder, which writes what waits in its memory before it ends, on a disk that may be slow.
-const RECORDER_STOP_WITHIN: Duration = Duration::from_secs(60);
-
 /// Whether a module works after launch, or waits to be switched on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Start {
@@ -144,7 +139,7 @@ impl Module {
     }
 
     pub(crate) fn is_recorder(&self) -> bool {
-        is_recorder(&self.program)
+        self.program == Program::Builtin(RECORDER.into())
     }
 
     /// An implicit module, with the defaults of all of these.
@@ -163,7 +158,7 @@ impl Module {
             start: Start::On,
             restart,
             ready_within: Duration::from_secs(10),
-            stop_within: STOP_WITHIN,
+            stop_within: crate::stopping::USUAL,
             busy_after: BUSY_AFTER,
             spin: Duration::ZERO,
             mailboxes: Mailboxes::default(),
@@ -235,13 +230,12 @@ impl Context<'_> {
         let streams = StreamSpec::read_all(section.section("stream", &format!("{what}, stream")), &what);
         let line = section.line;
         section.finish();
-        let program = program?;
-        let is_recorder = is_recorder(&program);
         let module = Module {
             name: name?,
             aliases,
             node: node?,
-            program,
+            stop_within: stop_within.unwrap_or(crate::stopping::usual(program.as_ref()?)),
+            program: program?,
             optional,
             required,
             calls: calls.names,
@@ -250,7 +244,6 @@ impl Context<'_> {
             start: start.unwrap_or_default(),
             restart,
             ready_within: ready_within.unwrap_or(Duration::from_secs(10)),
-            stop_within: stop_within.unwrap_or(if is_recorder { RECORDER_STOP_WITHIN } else { STOP_WITHIN }),
             busy_after: busy_after.unwrap_or(BUSY_AFTER),
             spin,
             mailboxes,
@@ -294,10 +287,6 @@ impl Context<'_> {
         }
         Some(name.into())
     }
-}
-
-fn is_recorder(program: &Program) -> bool {
-    *program == Program::Builtin(RECORDER.into())
 }
 
 fn program(section: &Section<'_>) -> Option<Program> {

@@ -18,8 +18,8 @@ const TOPICS: [&str; 7] = [
     "output.0/line",
 ];
 
-/// What is drawn of each, and whether it is reduced: of the camera's pictures, which are longer than 64 KiB, each fourth
-/// pixel.
+/// What is drawn of each, and whether it is reduced: of the camera's pictures, which are longer than 64 KiB, each
+/// fourth pixel.
 const DRAWN: [(&str, &str, bool); 5] = [
     ("camera.0/image", "foxglove.RawImage", true),
     ("depth.0/points", "foxglove.PointCloud", true),

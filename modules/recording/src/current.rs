@@ -142,7 +142,8 @@ impl Current {
         self.end_chunk()
     }
 
-    /// Writes messages as a chunk; with what is drawn of them these may be several. Under pressure nothing long is drawn.
+    /// Writes messages as a chunk; with what is drawn of them these may be several. Under pressure nothing long is
+    /// drawn.
     pub(crate) fn write(
         &mut self,
         batch: &Batch,

@@ -11,8 +11,8 @@
 //! ```
 //!
 //! [`Writer::write`] takes as long as copying the message, whatever the disk does. What does not fit the bounded queue
-//! is counted as lost, by channel and cause, in [`Status`] and in the file. A channel never takes more of the queue than
-//! is free: one that floods it leaves room to the others. A process that is killed loses what had not left its
+//! is counted as lost, by channel and cause, in [`Status`] and in the file. A channel never takes more of the queue
+//! than is free: one that floods it leaves room to the others. A process that is killed loses what had not left its
 //! memory: at most [`Options::flush`]. A loss of power takes what was not synced: at most [`Options::sync`] more.
 //!
 //! ```

@@ -25,8 +25,8 @@ pub struct Options {
     pub retry: Duration,
     /// What stays free on the disk.
     pub leave_bytes: u64,
-    /// Room for so many chunks of a megabyte, which wait in memory while the disk is slow. A channel takes half of it at
-    /// most, and never more than is free then; what finds no room is lost, and counted.
+    /// Room for so many chunks of a megabyte, which wait in memory while the disk is slow. A channel takes half of it
+    /// at most, and never more than is free then; what finds no room is lost, and counted.
     pub queue_chunks: usize,
     /// What other programs draw is in the same files.
     pub drawn: Option<DrawnBeside>,
