@@ -122,7 +122,7 @@ fn module(installation: &Installation, module: &Module) -> Value {
         "number": module.name.raw(),
         "line": module.line,
         "priority": module.name.class().0,
-        "scheduling": scheduling(installation.scheduling(module.name.class())),
+        "scheduling": scheduling(installation.scheduling_of(module)),
         "aliases": module.aliases.iter()
             .map(|alias| json!({ "name": text(alias), "number": alias.raw() })).collect::<Vec<_>>(),
         "runs": runs,

@@ -239,7 +239,12 @@ impl Page<'_> {
     fn module(&mut self, module: &Module) {
         let class = module.name.class();
         self.line("");
-        self.line(format!("{}  priority {}, {}", self.name(module.name), class.0, self.installation.scheduling(class)));
+        self.line(format!(
+            "{}  priority {}, {}",
+            self.name(module.name),
+            class.0,
+            self.installation.scheduling_of(module)
+        ));
         if !module.aliases.is_empty() {
             self.entry("is also", &self.names(module.aliases.iter().copied()));
         }

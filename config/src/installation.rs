@@ -146,6 +146,15 @@ impl Installation {
         (!self.nodes.iter().any(is_launch)).then_some(rule)
     }
 
+    /// How a module's process is scheduled: as its class says. The recorder gives way to no ordinary program, though
+    /// its class may be below all that it records: it would lose what those send while another program computes.
+    pub fn scheduling_of(&self, module: &Module) -> Scheduling {
+        match self.scheduling(module.name.class()) {
+            Scheduling::Normal { .. } if module.is_recorder() => Scheduling::Normal { nice: 0 },
+            by_class => by_class,
+        }
+    }
+
     /// How the processes of a class are scheduled.
     pub fn scheduling(&self, class: Class) -> Scheduling {
         self.scheduling.of(class)

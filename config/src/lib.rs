@@ -69,6 +69,7 @@ mod replicated;
 mod saved;
 mod scheduling;
 mod settings;
+mod stopping;
 mod stream;
 mod tcp;
 mod tdma;

@@ -95,6 +95,19 @@ fn what_is_recorded_is_found_by_module_and_item_and_is_called() {
 }
 
 #[test]
+fn a_recorder_gives_way_to_no_ordinary_program_and_has_time_for_its_disk() {
+    let of = |text: &str| {
+        let installation = parse(text);
+        let recorder = installation.module(installation.classes.parse_module("logd.0").unwrap()).unwrap();
+        assert_eq!(installation.scheduling(recorder.name.class()), Scheduling::Normal { nice: 12 });
+        (installation.scheduling_of(recorder), recorder.stop_within)
+    };
+    assert_eq!(of(RECORD), (Scheduling::Normal { nice: 0 }, Duration::from_secs(60)));
+    let said = RECORD.replace("builtin = \"logd\"", "builtin = \"logd\"\nstop-within = \"3 s\"");
+    assert_eq!(of(&said).1, Duration::from_secs(3));
+}
+
+#[test]
 fn memory_of_a_node_is_that_of_its_mailboxes_streams_and_journals() {
     let full = parse(FULL);
     let without = FULL.replace("stream.scan", "settings.scan").replace("stream.image", "settings.image");

@@ -7,7 +7,7 @@ mod router;
 mod slots;
 mod tcp;
 
-pub use recorder::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecorderProxy, RecordingState};
+pub use recorder::{ChannelPage, LostBy, RecordedMessages, Recorder, RecorderInterface, RecorderProxy, RecordingState};
 pub use replay::{Replay, ReplayInterface, ReplayPosition, ReplayProxy, ReplayRefusal};
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkCounters,

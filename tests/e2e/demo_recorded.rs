@@ -3,7 +3,7 @@
 use crate::harness::{Place, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost_recording::{ChannelInfo, info};
+use rohrpost_recording::{Info, info};
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/robot/tests/data/small.log");
 
@@ -18,7 +18,27 @@ const TOPICS: [&str; 7] = [
     "output.0/line",
 ];
 
-/// The demo, until it has recorded something of all; its last words.
+/// What is drawn of each, and whether it is reduced: of the camera's pictures, which are longer than 64 KiB, each
+/// fourth pixel.
+const DRAWN: [(&str, &str, bool); 5] = [
+    ("camera.0/image", "foxglove.RawImage", true),
+    ("depth.0/points", "foxglove.PointCloud", true),
+    ("laser.0/scan", "foxglove.PointCloud", false),
+    ("mapper.0/pose", "foxglove.PoseInFrame", false),
+    ("output.0/line", "foxglove.Log", false),
+];
+
+/// Whether something is drawn of each.
+fn is_drawn(told: &Info) -> bool {
+    DRAWN.iter().all(|(topic, type_name, is_reduced)| {
+        told.channels.iter().any(|channel| {
+            let is_it = channel.type_name == *type_name && channel.drawn_of.as_deref() == Some(*topic);
+            is_it && channel.messages > 0 && channel.is_reduced == *is_reduced
+        })
+    })
+}
+
+/// The demo, until it has recorded something of all, and drawn it; its last words.
 fn recorded(place: &Place, further: &[&str]) -> String {
     let arguments = [&["demo", "--no-gui", "--quiet", "--record", "out.mcap"], further].concat();
     let mut demo = Running::start(place.command(&arguments));
@@ -29,7 +49,8 @@ fn recorded(place: &Place, further: &[&str]) -> String {
         let channels = page["channels"].as_array()?;
         let has =
             |topic: &&str| channels.iter().any(|its| its["topic"] == **topic && its["written"].as_u64() > Some(0));
-        TOPICS.iter().all(has).then_some(())
+        let drawn = || info(&place.path("out.mcap.part/main-0001.mcap")).is_ok_and(|told| is_drawn(&told));
+        (TOPICS.iter().all(has) && drawn()).then_some(())
     });
     demo.stop()
 }
@@ -50,20 +71,7 @@ fn all_of_a_demo_is_in_one_file() {
         let channel = told.channels.iter().find(|channel| channel.topic == topic);
         assert!(channel.is_some_and(|channel| channel.messages > 0), "{topic}: {told:?}");
     }
-    // Of the camera's pictures, which are longer than 64 KiB, each fourth pixel.
-    let drawn = [
-        ("camera.0/image", "foxglove.RawImage", true),
-        ("depth.0/points", "foxglove.PointCloud", true),
-        ("laser.0/scan", "foxglove.PointCloud", false),
-        ("mapper.0/pose", "foxglove.PoseInFrame", false),
-        ("output.0/line", "foxglove.Log", false),
-    ];
-    for (topic, type_name, is_reduced) in drawn {
-        let is_it =
-            |channel: &&ChannelInfo| channel.type_name == type_name && channel.drawn_of.as_deref() == Some(topic);
-        let channel = told.channels.iter().find(is_it);
-        assert!(channel.is_some_and(|its| its.messages > 0 && its.is_reduced == is_reduced), "{topic}: {told:?}");
-    }
+    assert!(is_drawn(&told), "{told:?}");
     let said = place.say(&["record", "info", "out.mcap"]).ok();
     assert!(said.contains("foxglove.RawImage protobuf, drawn of camera.0/image, reduced to 64 KiB"), "{said}");
     assert!(told.configuration["demo.toml"].contains("[record]"));

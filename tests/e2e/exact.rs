@@ -1,6 +1,7 @@
 //! Exact replay: the demo's modules repeat what they did on a loaded and disturbed node, and whatever differs is found.
 
 use crate::harness::{Place, RECORDED_CLASSES, Robot, halt, signal, wait};
+use crate::load::Load;
 use crate::process::{Running, Said};
 use crate::seer::{NOTHING, OTHER_BUILD, OTHER_QUESTIONS, entry};
 use nix::sys::signal::Signal;
@@ -9,8 +10,6 @@ use serde_json::Value;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Set where the replays of a run are to be more than two: 20 in the long proof.
@@ -121,25 +120,6 @@ fn begun(file: &Path, module: &str) -> usize {
 pub(crate) fn wait_journaled(file: &Path, module: &str, more: usize) {
     let before = journaled(file, module);
     wait(format!("{module} goes on"), || (journaled(file, module) >= before + more).then_some(()));
-}
-
-/// Keeps all processors busy until it is dropped.
-struct Load(Arc<AtomicBool>, Vec<std::thread::JoinHandle<()>>);
-
-impl Load {
-    fn begin() -> Self {
-        let ends = Arc::new(AtomicBool::new(false));
-        let threads = std::thread::available_parallelism().map_or(2, usize::from);
-        let work = |ends: Arc<AtomicBool>| std::thread::spawn(move || while !ends.load(Ordering::Relaxed) {});
-        Self(ends.clone(), (0..threads).map(|_| work(ends.clone())).collect())
-    }
-}
-
-impl Drop for Load {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-        self.1.drain(..).for_each(|thread| drop(thread.join()));
-    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::harness::Place;
 use rohrpost::schema::{DataItem, DataKind, Description, Field, Members, Named, Schema, Type};
 use rohrpost::types::Pose;
-use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+use rohrpost_recording::{ChannelSpec, LossCause, Message, Options, Session, Writer};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ fn recording(place: &Place, stem: &str) -> PathBuf {
         writer.write(channels[0], &message).unwrap();
         channels.reverse();
     }
-    writer.count_lost(channels[0], 3);
+    writer.count_lost(channels[0], LossCause::Disk, 3);
     writer.finish().1.unwrap();
     place.path(&format!("{stem}-0001.mcap"))
 }
@@ -53,7 +53,7 @@ fn a_recording_is_described_cut_merged_and_recovered() {
     for words in [
         ": 1000 messages, ",
         "closed (ended)",
-        "3 messages are lost",
+        "3 messages are lost: 3 as the disk was slower than they came, or failed",
         "from 1700000000.000000000 to 1700000009.990000000, 9.990 s",
         "node base",
     ] {

@@ -12,7 +12,7 @@ use rohrpost::serde::Deserialize;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Context, Module, ModuleError, data};
 use rohrpost_mailbox::StreamId;
-use rohrpost_recording::{Reader, info, is_closed};
+use rohrpost_recording::{LossCause, Reader, info, is_closed};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -295,6 +295,40 @@ fn a_recorder_that_is_killed_goes_on_and_makes_a_whole_file_of_what_it_had() {
         let later = assert_all_there(&next, topic, last, 1);
         assert!(later[0] > before, "{topic}: {} behind {before}", later[0]);
     }
+}
+
+/// The ring keeps 512 records.
+#[test]
+fn what_was_written_while_the_recorder_was_away_is_taken_from_the_ring_or_counted() {
+    let place = Place::new();
+    let logd = LOGD.replace("stop-within", "restart = \"never\"\nstop-within");
+    let (mut launch, robot) = launched_with(&place, &logd, RECORD);
+    let topic = "feeder.0/frame";
+    feed_until_recorded(&place, "feeder.0");
+    let mut all = Vec::new();
+    for (number, meanwhile, is_lost) in [(1, 100, false), (2, 700, true)] {
+        let [file, next] = [number, number + 1].map(|at| place.path(&format!("recordings/main-{at:04}.mcap")));
+        let before = feed(&place, "feeder.0", 50);
+        wait("all is written", || (numbers(&file, topic).last() == Some(&before)).then_some(()));
+        let pid = robot.pid("logd.0");
+        signal(pid, Signal::SIGKILL);
+        wait("it is gone", || robot.process("logd.0").is_none().then_some(()));
+        let last = feed(&place, "feeder.0", meanwhile);
+        place.say(&["start", "logd.0"]).ok();
+        wait("what came meanwhile is written", || (numbers(&next, topic).last()? >= &last).then_some(()));
+        all.extend(numbers(&file, topic));
+        let page = call(&place, "logd.0", &["channels", "0"]);
+        let channel = page["channels"].as_array().unwrap().iter().find(|channel| channel["topic"] == topic).unwrap();
+        let away = channel["lost_by"]["away"].as_u64().unwrap();
+        let began = numbers(&next, topic)[0];
+        assert_eq!((began - before - 1, away > 0), (away, is_lost), "{channel}");
+        assert_eq!(channel["lost"], away, "{channel}");
+    }
+    drop(robot);
+    launch.stop();
+    assert!(all.is_sorted_by(|a, b| a < b), "nothing is recorded twice: {all:?}");
+    let told = info(&place.path("recordings/main-0003.mcap")).unwrap();
+    assert!(told.is_closed && told.losses[LossCause::Away] >= 700 - 512, "{told:?}");
 }
 
 #[test]

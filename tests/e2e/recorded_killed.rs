@@ -71,6 +71,10 @@ enum Trouble {
 
 const TROUBLES: [Trouble; 4] = [Trouble::Nothing, Trouble::Rotates, Trouble::Full, Trouble::Away];
 
+fn trouble_of(round: u32) -> Trouble {
+    TROUBLES[round as usize % TROUBLES.len()]
+}
+
 /// Not a test: the one below starts it where the disk is mounted.
 #[test]
 fn role() {
@@ -132,11 +136,10 @@ impl Torture {
         self.place.say(&["call", "feeder.0", "feed", ENDLESS]).ok();
         let kills = kills();
         for round in 0..kills {
-            let trouble = TROUBLES[round as usize % TROUBLES.len()];
-            self.round(round, trouble, &robot);
+            self.round(round, trouble_of(round), &robot);
             launch.assert_runs();
         }
-        let began = self.root_files(&format!("round-{kills}"));
+        let began = self.root_files(kills);
         drop(robot);
         launch.stop();
         let folder = self.recordings().join(format!("round-{kills}"));
@@ -156,8 +159,10 @@ impl Torture {
         std::thread::sleep(Duration::from_micros(self.chance.next_u64() % most_us));
     }
 
-    /// Has the recorder go to a new folder. Files that it made before that, which are closed now.
-    fn root_files(&self, folder: &str) -> Vec<PathBuf> {
+    /// Has the recorder go to the folder of a round. Files that it made before that, which are closed now; but for one
+    /// that a disk took which was full again at once.
+    fn root_files(&self, round: u32) -> Vec<PathBuf> {
+        let folder = format!("round-{round}");
         wait(format!("the recorder goes to {folder}"), || {
             let answer = ControlConnection::open(self.address).ask(&format!("directory {folder}"));
             answer.starts_with("OK ").then_some(())
@@ -165,14 +170,20 @@ impl Torture {
         let kept = self.place.path(&format!("{folder}-before"));
         std::fs::create_dir(&kept).unwrap();
         let all = files(&self.recordings());
-        assert!(all.iter().all(|file| is_closed(file).unwrap()), "{all:?}");
-        all.iter().map(|file| moved(file, &kept)).collect()
+        let was_full = round.checked_sub(1).is_some_and(|before| trouble_of(before) == Trouble::Full);
+        let whole = |file: &PathBuf| {
+            let is_whole = is_closed(file).unwrap();
+            assert!(is_whole || was_full, "round {round}: {}", file.display());
+            let file = moved(file, &kept);
+            if is_whole { file } else { recover(&file, &recovered_path(&file), &mut |_, _| {}).unwrap().path }
+        };
+        all.iter().map(whole).collect()
     }
 
     /// One incarnation of the recorder, from its beginning to its death.
     fn round(&mut self, round: u32, trouble: Trouble, robot: &Robot) {
         let name = format!("round-{round}");
-        let began = self.root_files(&name);
+        let began = self.root_files(round);
         let folder = self.recordings().join(&name);
         let mut control = ControlConnection::open(self.address);
         wait("it writes there", || {

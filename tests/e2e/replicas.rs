@@ -324,6 +324,27 @@ fn what_sampling_leaves_out_is_told_so() {
 }
 
 #[test]
+fn what_sampling_leaves_out_is_not_recorded_as_lost() {
+    let pair = Pair::launched_with(&addresses(), NETWORK, ", every = 5");
+    let file = pair.place.path("recordings/brain-0001.mcap");
+    let feed_beyond = |number: u64| {
+        wait(format!("records behind {number} are recorded"), || {
+            pair.say("base", &["call", "feeder.0", "feed", "1"]);
+            values(&file, "feeder.0/frame").last().is_some_and(|(_, newest)| *newest > number).then_some(())
+        });
+    };
+    feed_beyond(0);
+    pair.say("base", &["call", "feeder.0", "feed", "200"]);
+    feed_beyond(200);
+    let place = pair.stop();
+    let (recorded, told) = (values(&file, "feeder.0/frame"), info(&file).unwrap());
+    let channel = told.channels.iter().find(|channel| channel.topic == "feeder.0/frame").unwrap();
+    let wanted = (recorded[recorded.len() - 1].1 - recorded[0].1) / 5 + 1;
+    assert_eq!((recorded.len() as u64 + channel.lost, channel.losses.all()), (wanted, channel.lost), "{channel:?}");
+    place.assert_empty();
+}
+
+#[test]
 fn what_a_reader_is_too_slow_for_is_told_so() {
     let (missed, told) = missed("", 700, true);
     assert!(missed.passed_over > 0 && missed.sampled == 0, "{missed:?}");

@@ -170,7 +170,6 @@ pub(super) fn recorder(installation: &Installation, to: &Path) -> Result<String,
 [[module]]
 name = \"{RECORDER}.0\"
 builtin = \"{RECORDER}\"
-stop-within = \"10 s\"
 
 [module.mailbox.data]
 slots = 256

@@ -1,8 +1,8 @@
-//! What an earlier process of the recorder has recorded last. A stream of which no record is to be missing goes on
-//! behind that: nothing of it is recorded twice.
+//! What an earlier process of the recorder has recorded last. A stream goes on behind that: nothing of it is recorded
+//! twice, and what its ring keeps no more is counted.
 
 use super::leftovers::files;
-use rohrpost_mailbox::{Participant, StreamId, StreamReader};
+use rohrpost_mailbox::{Participant, RecordInfo, Stamp, StreamId, StreamReader};
 use rohrpost_recording::{LastMessage, last_message};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,8 +28,8 @@ impl EarlierFiles {
         Self { newest_first: all }
     }
 
-    /// The sequence of the first record of a stream that is not in a file, if one that the stream still keeps is the
-    /// last one of its topic there. None also if the files are of another run: then records differ.
+    /// The sequence of the first record of a stream that is not in a file, if its topic has one there; the stream need
+    /// not keep it any more. None also if the files are of another run: then records differ.
     pub(super) fn behind(&self, topic: &str, participant: &Arc<Participant>, id: StreamId) -> Option<u64> {
         let newest = participant.node().inspect_stream(id).ok().flatten()?.newest?;
         let mut reader = participant.stream_reader(id).ok()?;
@@ -42,26 +42,29 @@ impl EarlierFiles {
         // What cannot be read says nothing: better twice than missing.
         let files = self.newest_first.iter().filter(is_of_it).take(FILES_MAX);
         let mut last = files.filter_map(|file| last_message(file, topic).ok().flatten());
-        last.find_map(|last| behind(&mut reader, newest.sequence, &last))
+        last.find_map(|last| behind(&mut reader, &newest, &last))
     }
 }
 
-/// The sequence behind this message, if it is a record that the stream still keeps.
-fn behind(reader: &mut StreamReader, newest: u64, last: &LastMessage) -> Option<u64> {
+/// The sequence behind this message, if it is a record that the stream still keeps, or may be one that it kept.
+fn behind(reader: &mut StreamReader, newest: &RecordInfo, last: &LastMessage) -> Option<u64> {
     // A recording has 32 bits of it.
-    let back = (newest as u32).wrapping_sub(last.sequence);
-    let sequence = newest.checked_sub(back.into())?;
-    let record = reader.record(sequence)?;
-    let LastMessage { epoch, stamp_ns, data, .. } = last;
-    let stamp = record.info().stamp;
-    ((stamp.epoch, stamp.ns) == (*epoch, *stamp_ns) && record.body() == data).then_some(sequence + 1)
+    let back = (newest.sequence as u32).wrapping_sub(last.sequence);
+    let sequence = newest.sequence.checked_sub(back.into())?;
+    let LastMessage { epoch, stamp_ns: ns, ref data, .. } = *last;
+    let stamp = Stamp { epoch, ns };
+    let is_it = match reader.record(sequence) {
+        Some(record) => record.info().stamp == stamp && record.body() == data,
+        None => stamp <= newest.stamp,
+    };
+    is_it.then_some(sequence + 1)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use rohrpost::schema::Type;
-    use rohrpost_mailbox::{Name, Node, Stamp, StreamShape, StreamWriter};
+    use rohrpost_mailbox::{Name, Node, StreamShape, StreamWriter};
     use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
     use std::collections::BTreeMap;
 
@@ -139,7 +142,10 @@ mod tests {
         place.write(5..4 + KEEP);
         assert_eq!(place.behind(), Some(5), "it is the oldest that is kept");
         place.write(4 + KEEP..8 + KEEP);
-        assert_eq!(place.behind(), None, "it is kept no more, and all that is came later");
+        assert_eq!(place.behind(), Some(5), "it is kept no more: those between are lost, and to be counted");
+        let other = |number: u64| stamp_ns(number) + 1_000_000;
+        place.record("image", 3..5, other, |number| number);
+        assert_eq!(place.behind(), Some(5), "a later file is of another run: its records are newer than the stream's");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Tells what goes wrong with a recording: once when it begins, and when it is over.
 
 use rohrpost::output::errno_of;
-use rohrpost_recording::{DiskError, Status};
+use rohrpost_recording::{DiskError, Losses, Status};
 use std::mem::{Discriminant, discriminant};
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ pub(super) struct Health {
     /// Messages lost when it began.
     lost_before: u64,
     /// Messages lost that were told.
-    lost_told: u64,
+    lost_told: Losses,
     /// When they were.
     told_at: Option<Instant>,
 }
@@ -35,25 +35,26 @@ impl Health {
             None if self.problem.is_some() => {
                 let lost = status.lost - self.lost_before;
                 tracing::warn!("records again; {lost} messages were lost meanwhile");
-                (self.lost_told, self.told_at) = (status.lost, Some(now));
+                (self.lost_told, self.told_at) = (status.losses, Some(now));
             }
             _ => self.losses(status, now),
         }
         self.problem = problem.map(discriminant);
     }
 
-    /// Those for other reasons: the disk is slow, or the recorder.
+    /// Those while the disk takes what it is given.
     fn losses(&mut self, status: &Status, now: Instant) {
         let is_early = self.told_at.is_some_and(|told| now < told + LOSSES);
-        if status.problem.is_some() || is_early || status.lost <= self.lost_told {
+        let new = status.losses.since(&self.lost_told);
+        if status.problem.is_some() || is_early || new == Losses::default() {
             return;
         }
         let most = status.channels.iter().max_by_key(|channel| channel.lost).map_or("", |channel| &channel.topic);
         tracing::warn!(
-            "{} messages were lost, most so far of {most}: they come faster than the recorder or its disk takes them \
-             (`channels` of the recorder counts them)",
-            status.lost - self.lost_told
+            "{} messages were lost, most so far of {most}: {} (`channels` of the recorder counts them)",
+            new.all(),
+            new.text()
         );
-        (self.lost_told, self.told_at) = (status.lost, Some(now));
+        (self.lost_told, self.told_at) = (status.losses, Some(now));
     }
 }

@@ -11,6 +11,7 @@
 //!
 //! The module's thread copies each value once, from the ring or the mailbox into memory, and never waits for the disk.
 
+mod blame;
 mod control;
 mod earlier;
 mod folder;
@@ -25,13 +26,13 @@ use crate::version;
 use control::{ControlServer, Orders, Told};
 use earlier::EarlierFiles;
 use health::Health;
-use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecordingState};
+use rohrpost::interfaces::{ChannelPage, LostBy, RecordedMessages, Recorder, RecorderInterface, RecordingState};
 use rohrpost::output::errno_of;
 use rohrpost::{Context, Module, ModuleClock, ModuleError, Ready, Received, Start, StartError};
 use rohrpost_config::{Installation, Recording};
 use rohrpost_mailbox::TimeSource;
 use rohrpost_recording::{
-    ControlAnswer, ControlCommand, DrawnBeside, Earlier, Options, Rotation, Session, Status, Writer,
+    ControlAnswer, ControlCommand, DrawnBeside, Earlier, LossCause, Losses, Options, Rotation, Session, Status, Writer,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -42,8 +43,8 @@ use taps::Taps;
 const PERIOD: Duration = Duration::from_millis(200);
 /// Bytes of channels in a page, so that it fits in any reply mailbox.
 const PAGE_BYTES: usize = 2500;
-/// Most bytes that a channel has besides its topic: the topic's length, and two counts.
-const NUMBERS_BYTES: usize = 2 + 10 + 10;
+/// Most bytes that a channel has besides its topic: the topic's length, two counts, and one for each cause of losses.
+const NUMBERS_BYTES: usize = 2 + 10 + 10 + LossCause::ALL.len() * 10;
 
 pub(super) fn run(start: Start) -> Result<(), StartError> {
     rohrpost_modules::runtime::run_started::<Logd>(start)
@@ -97,6 +98,7 @@ impl Module for Logd {
         // It serves the computer's disk: also while the robot's time stands still.
         context.use_computer_clock();
         context.set_period(PERIOD);
+        context.take_all_at_end();
         Ok(Self {
             options,
             session,
@@ -130,6 +132,7 @@ impl Module for Logd {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        self.taps.begin_pace();
         self.find(context)?;
         let status = self.writer.as_ref().map(Writer::status);
         if let Some(status) = &status {
@@ -151,7 +154,7 @@ impl Module for Logd {
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
         match self.writer.as_mut() {
-            Some(writer) if has_begun(context.clock()) => self.taps.take(writer, &context.now(), data),
+            Some(writer) if has_begun(context.clock()) => self.taps.take(writer, context, data),
             _ => self.taps.pass_over(self.earlier.as_mut(), &context.now(), data),
         }
         Ok(())
@@ -181,9 +184,10 @@ impl Logd {
             earlier.fill(newest);
         }
         self.earlier = Some(earlier);
-        let (Status { written, lost, files_closed, files_torn, .. }, told) = writer.finish();
+        let (Status { written, lost, losses, files_closed, files_torn, .. }, told) = writer.finish();
         let files = files_closed + files_torn;
-        tracing::info!("recorded {written} messages, {lost} lost, in {files} files");
+        let why = if lost > 0 { format!(" ({})", losses.text()) } else { String::new() };
+        tracing::info!("recorded {written} messages, {lost} lost{why}, in {files} files");
         self.ended = match told {
             Ok(()) => ControlAnswer::ok().with("written", written).with("lost", lost).with("files", files),
             Err(error) => {
@@ -230,7 +234,12 @@ impl Recorder for Logd {
             bytes <= PAGE_BYTES
         };
         let rest = channels.into_iter().skip(from as usize);
-        let rest = rest.map(|its| RecordedMessages { topic: its.topic, written: its.written, lost: its.lost });
+        let rest = rest.map(|its| RecordedMessages {
+            topic: its.topic,
+            written: its.written,
+            lost: its.lost,
+            lost_by: by_cause(&its.losses),
+        });
         ChannelPage { total, channels: rest.take_while(fits).collect() }
     }
 
@@ -285,9 +294,15 @@ fn state(status: &Status) -> RecordingState {
         synced: status.synced,
         unsure: status.unsure,
         lost: status.lost,
+        lost_by: by_cause(&status.losses),
         waiting: status.waiting,
         bytes: status.bytes,
         files_closed: status.files_closed,
         files_torn: status.files_torn,
     }
+}
+
+fn by_cause(losses: &Losses) -> LostBy {
+    let [way, away, recorder, processor, disk, long] = LossCause::ALL.map(|cause| losses[cause]);
+    LostBy { way, away, recorder, processor, disk, long }
 }

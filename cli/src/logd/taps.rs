@@ -1,7 +1,8 @@
 //! What is recorded of which module: wanted by the configuration, described by the module, subscribed to.
 
+use super::blame::{Blame, Omitted, mailbox_losses};
 use super::earlier::EarlierFiles;
-use super::sampler::{Numbering, Sampler};
+use super::sampler::{Lost, Numbering, Sampler};
 use rohrpost::common::OutputLevel;
 use rohrpost::description::{DescriptionRequest, noted};
 use rohrpost::interface::Interface;
@@ -31,6 +32,8 @@ pub(super) struct Taps {
     taps: Vec<Tap>,
     /// Recorded before this process.
     earlier: EarlierFiles,
+    /// Why values do not come.
+    blame: Blame,
 }
 
 /// A module of which something is wanted.
@@ -58,6 +61,10 @@ struct Tap {
     texts: BTreeMap<String, String>,
     sampling: Sampling,
     sampler: Sampler,
+    /// Its publisher is on this node.
+    is_near: bool,
+    /// It goes on behind an earlier process: what is missing before the first record went while there was none.
+    is_resumed: bool,
     /// Lines of output: from this level on.
     least: Option<OutputLevel>,
     /// None: not yet, or it cannot be opened.
@@ -108,7 +115,7 @@ impl Taps {
                 || entries().any(|entry| entry.from.map_or(*is_in_file, |from| from == *name))
         };
         let sources = names.filter(is_wanted).map(|(name, _)| source(name)).collect();
-        Self { recording, sources, taps: Vec::new(), earlier }
+        Self { recording, sources, taps: Vec::new(), earlier, blame: Blame::new() }
     }
 
     /// A recording begins: what is known already has its channels from the first file on.
@@ -143,24 +150,34 @@ impl Taps {
             taps.iter_mut().for_each(|tap| tap.open_channel(writer));
             self.taps.extend(taps);
         }
-        let named = Some(&self.earlier).filter(|_| !self.recording.exact.is_empty());
-        let opens = |tap: &&mut Tap| tap.source.is_none() && (has_begun || named.is_none() || !tap.goes_back(context));
+        let names_long = !self.recording.exact.is_empty();
+        let opens = |tap: &&mut Tap| tap.source.is_none() && (has_begun || !names_long || !tap.is_whole(context));
         let opening: Vec<&mut Tap> = self.taps.iter_mut().filter(opens).collect();
-        opening.into_iter().try_for_each(|tap| tap.open(context, named))
+        opening.into_iter().try_for_each(|tap| tap.open(context, &self.earlier, names_long))
+    }
+
+    /// Nothing waits to be taken, or soon will not.
+    pub(super) fn begin_pace(&mut self) {
+        self.blame.begin_pace();
     }
 
     /// Records a value that came, if it is to be.
-    pub(super) fn take(&mut self, writer: &mut Writer, now: &SystemTime, data: &Received<'_>) {
-        let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };
+    pub(super) fn take(&mut self, writer: &mut Writer, context: &Context, data: &Received<'_>) {
+        let Self { taps, blame, .. } = self;
+        let Some(tap) = taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };
         let Some(channel) = tap.channel else { return };
-        let (lost, is_chosen) = tap.sampler.note(&data.head, Instant::now());
-        if lost > 0 {
-            writer.count_lost(channel, lost);
+        let (lost, is_chosen) = tap.sampler.note(&data.head, data.missed(), Instant::now());
+        if lost != Lost::default() {
+            blame
+                .causes(lost, tap.omitted(), || mailbox_losses(context))
+                .into_iter()
+                .for_each(|(cause, count)| writer.count_lost(channel, cause, count));
         }
+        tap.is_resumed = false;
         if !is_chosen || !tap.is_important(data) {
             return;
         }
-        let message = message(now, data);
+        let message = message(&context.now(), data);
         // What is refused is counted; that the queue is full, tells `Health` with the reason.
         if let Err(error @ WriteError::Long(_)) = writer.write(channel, &message)
             && tap.refusal.is_empty()
@@ -175,7 +192,7 @@ impl Taps {
     /// Notes a value that comes while nothing is recorded: it is no loss. The next recording may begin with it.
     pub(super) fn pass_over(&mut self, earlier: Option<&mut Earlier>, now: &SystemTime, data: &Received<'_>) {
         let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };
-        let (_, is_chosen) = tap.sampler.note(&data.head, Instant::now());
+        let (_, is_chosen) = tap.sampler.note(&data.head, data.missed(), Instant::now());
         if let (true, Some(channel), Some(earlier)) = (is_chosen, tap.channel, earlier) {
             earlier.note(channel, &message(now, data));
         }
@@ -264,6 +281,8 @@ impl SourceModule {
             texts: texts.into_iter().map(|(key, text)| (key.to_owned(), text)).collect(),
             sampling,
             sampler: Sampler::new(sampling, numbering),
+            is_near: self.own.is_some(),
+            is_resumed: false,
             least,
             source: None,
             refusal: String::new(),
@@ -283,9 +302,8 @@ impl Tap {
         self.channel = opened.ok();
     }
 
-    /// Subscribes. A stream that has no seat left is tried again. `named`: what is recorded already, if journals may
-    /// name long records: then also those are recorded that were written before the recorder came, and are in no file.
-    fn open(&mut self, context: &mut Context, named: Option<&EarlierFiles>) -> Result<(), ModuleError> {
+    /// Subscribes. A stream that has no seat left is tried again. `names_long`: journals may name long records.
+    fn open(&mut self, context: &mut Context, earlier: &EarlierFiles, names_long: bool) -> Result<(), ModuleError> {
         let opened = match (self.sampler.numbering(), self.sampling) {
             (Numbering::Records, _) => {
                 context.subscribe_stream_untyped(self.from, &self.item, self.interface).map(Source::Stream)
@@ -301,10 +319,8 @@ impl Tap {
         };
         match opened {
             Ok(source) => {
-                if let (Source::Stream(subscription), Some(earlier)) =
-                    (&source, named.filter(|_| self.goes_back(context)))
-                {
-                    self.go_back(context, subscription, earlier);
+                if let (Source::Stream(subscription), Sampling::Each | Sampling::Every(_)) = (&source, self.sampling) {
+                    self.go_back(context, subscription, earlier, names_long);
                 }
                 self.source = Some(source);
                 self.refusal.clear();
@@ -323,7 +339,7 @@ impl Tap {
 
     /// Whether also those of its records are recorded that were written before the recorder came: of a journal, and of
     /// a stream of records that journals may name.
-    fn goes_back(&self, context: &Context) -> bool {
+    fn is_whole(&self, context: &Context) -> bool {
         if (self.sampler.numbering(), self.sampling) != (Numbering::Records, Sampling::Each) {
             return false;
         }
@@ -339,14 +355,35 @@ impl Tap {
         self.item.number == JOURNAL_NUMBER
     }
 
-    /// It is recorded from behind the last record in a file on, or from the oldest one that is kept.
-    fn go_back(&self, context: &mut Context, subscription: &StreamSubscription<()>, earlier: &EarlierFiles) {
+    /// A stream is recorded from behind the last record in a file of an earlier process on. If there is none, one of
+    /// records that journals may name is recorded from the oldest one on that is kept.
+    fn go_back(
+        &mut self,
+        context: &mut Context,
+        subscription: &StreamSubscription<()>,
+        earlier: &EarlierFiles,
+        names_long: bool,
+    ) {
         let participant = context.link().borrow().participant().clone();
-        match earlier.behind(&topic(&self.module, &self.item.field.name), &participant, self.id()) {
-            Some(sequence) => context.rewind_to(subscription, sequence),
-            // It begins with the oldest one by itself.
-            None if self.is_journal() => {}
-            None => context.rewind(subscription),
+        let is_whole = (names_long || self.is_journal()) && self.is_whole(context);
+        let behind = earlier.behind(&topic(&self.module, &self.item.field.name), &participant, self.id());
+        self.is_resumed = behind.is_some();
+        match behind {
+            Some(sequence) if is_whole => context.rewind_to(subscription, sequence),
+            Some(sequence) => context.resume_at(subscription, sequence),
+            // A journal begins with the oldest one by itself.
+            None if is_whole && !self.is_journal() => context.rewind(subscription),
+            None => {}
+        }
+    }
+
+    /// What a value is that did not come.
+    fn omitted(&self) -> Omitted {
+        match self.sampler.numbering() {
+            Numbering::Records if self.is_resumed => Omitted::EarlierRecord,
+            Numbering::Records => Omitted::Record,
+            Numbering::Packages if self.is_near => Omitted::NearPackage,
+            Numbering::Packages => Omitted::FarPackage,
         }
     }
 

@@ -7,8 +7,8 @@ use crate::units::size;
 use rohrpost::output::plain::ForeignText;
 use rohrpost::schema::describe_type;
 use rohrpost_recording::format::PROFILE;
-use rohrpost_recording::{AttachmentInfo, ChannelInfo, Damage, Info, Shown};
-use serde_json::{Value, json};
+use rohrpost_recording::{AttachmentInfo, ChannelInfo, Damage, Info, LossCause, Losses, Shown};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -51,10 +51,8 @@ fn text(info: &Info) -> String {
     let messages = messages_text(info);
     let mut lines = vec![format!("{path}: {messages}, {bytes} in {chunks} chunks, {closed}")];
     if info.lost > 0 {
-        lines.push(format!(
-            "{} messages are lost: the disk was too slow, or they never came to the recorder",
-            info.lost
-        ));
+        let why = if info.losses.all() > 0 { info.losses.text() } else { "the file does not tell why".into() };
+        lines.push(format!("{} messages are lost: {why}", info.lost));
     }
     if info.repeated > 0 {
         let topics = info.channels.iter().filter(|channel| channel.repeated > 0).map(|channel| &channel.topic);
@@ -141,6 +139,10 @@ fn type_text(channel: &ChannelInfo) -> String {
     }
 }
 
+fn lost_by(losses: &Losses) -> Value {
+    LossCause::ALL.iter().map(|cause| (cause.name().to_owned(), losses[*cause].into())).collect::<Map<_, _>>().into()
+}
+
 fn as_json(info: &Info) -> Value {
     let channels = info.channels.iter().map(|channel| {
         json!({
@@ -148,6 +150,7 @@ fn as_json(info: &Info) -> Value {
             "type": channel.ty.as_deref().map(describe_type), "message_encoding": channel.message_encoding,
             "schema_encoding": channel.schema_encoding, "drawn_of": channel.drawn_of, "reduced": channel.is_reduced,
             "messages": channel.messages, "repeated": channel.repeated, "lost": channel.lost,
+            "lost_by": lost_by(&channel.losses),
             "first_ns": channel.first_ns, "last_ns": channel.last_ns,
         })
     });
@@ -166,7 +169,7 @@ fn as_json(info: &Info) -> Value {
     json!({
         "path": info.path, "bytes": info.bytes, "is_closed": info.is_closed, "closed_because": info.closed_because,
         "library": info.library, "profile": info.profile, "chunks": info.chunks, "messages": info.messages,
-        "repeated": info.repeated, "lost": info.lost,
+        "repeated": info.repeated, "lost": info.lost, "lost_by": lost_by(&info.losses),
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
         "earlier_configuration": info.earlier_configuration,

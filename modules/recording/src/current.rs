@@ -8,6 +8,7 @@ use crate::error::DiskError;
 use crate::format::{
     CHUNK_BYTES_MAX, MESSAGE_ENCODING, MESSAGE_OVERHEAD_BYTES, SCHEMA_ENCODING, VERSION, key, metadata, session_key,
 };
+use crate::loss::Losses;
 use crate::newest::Newest;
 use crate::options::{Options, Session};
 use crate::order::Mark;
@@ -18,6 +19,9 @@ use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// What is longer is not drawn while too much waits.
+const DRAWN_PRESSED_BYTES_MAX: usize = 4 << 10;
 
 /// A channel as this file has it.
 #[derive(Clone, Copy)]
@@ -46,14 +50,14 @@ pub(crate) struct Current {
     /// Modules that are described.
     modules: usize,
     /// Losses of each channel that earlier files tell.
-    lost_before: Vec<u64>,
+    lost_before: Vec<Losses>,
     /// Losses that this one tells, too.
-    lost_told: Vec<u64>,
+    lost_told: Vec<Losses>,
     epoch: Option<u64>,
 }
 
 impl Current {
-    pub(crate) fn new(file: OpenFile, options: &Options, lost_before: Vec<u64>, now: Instant) -> Self {
+    pub(crate) fn new(file: OpenFile, options: &Options, lost_before: Vec<Losses>, now: Instant) -> Self {
         Self {
             file,
             opened: now,
@@ -121,7 +125,7 @@ impl Current {
             let texts = [(key::EPOCH, message.epoch.to_string()), (key::REPEATED, "true".to_owned())];
             let id = self.channel(&channels[at], self.described[at].schema, texts)?;
             // So that the file's time begins with what is new in it.
-            self.put(id, &Message { arrival_ns: first.arrival_ns, ..message })?;
+            self.put(id, &Message { arrival_ns: first.arrival_ns, ..message }, true)?;
         }
         self.end_chunk()
     }
@@ -138,8 +142,14 @@ impl Current {
         self.end_chunk()
     }
 
-    /// Writes messages as a chunk; with what is drawn of them these may be several.
-    pub(crate) fn write(&mut self, batch: &Batch, channels: &[Arc<ChannelState>]) -> Result<(), DiskError> {
+    /// Writes messages as a chunk; with what is drawn of them these may be several. Under pressure nothing long is
+    /// drawn.
+    pub(crate) fn write(
+        &mut self,
+        batch: &Batch,
+        channels: &[Arc<ChannelState>],
+        is_pressed: bool,
+    ) -> Result<(), DiskError> {
         for (at, message) in batch.messages() {
             if self.epoch != Some(message.epoch) {
                 self.tell_epoch(message.epoch, message.arrival_ns)?;
@@ -150,7 +160,7 @@ impl Current {
                 known.id = self.channel(&channels[at], known.schema, [(key::EPOCH, message.epoch.to_string())])?;
                 self.described[at] = known;
             }
-            self.put(known.id, &message)?;
+            self.put(known.id, &message, !is_pressed || message.data.len() <= DRAWN_PRESSED_BYTES_MAX)?;
         }
         self.end_chunk()?;
         self.messages += batch.len() as u64;
@@ -177,12 +187,12 @@ impl Current {
         Ok(id)
     }
 
-    /// Adds a message to the present chunk, and what is drawn of it.
-    fn put(&mut self, channel_id: u16, message: &Message<'_>) -> Result<(), DiskError> {
+    /// Adds a message to the present chunk, and what is drawn of it, if it is.
+    fn put(&mut self, channel_id: u16, message: &Message<'_>, is_drawn: bool) -> Result<(), DiskError> {
         let Message { arrival_ns: log_time, stamp_ns: publish_time, sequence, data, .. } = *message;
         let header = MessageHeader { channel_id, sequence, log_time, publish_time };
         self.add(&header, data)?;
-        let Some(drawing) = &mut self.drawing else { return Ok(()) };
+        let Some(drawing) = self.drawing.as_mut().filter(|_| is_drawn) else { return Ok(()) };
         for drawn in drawing.draw(channel_id, publish_time, data) {
             let Definition { topic, message_encoding, texts, schema, .. } = &*drawn.channel;
             let schema = self.file.schema(&schema.name, &schema.encoding, &schema.data)?;
@@ -233,19 +243,20 @@ impl Current {
 
     /// Tells losses that are not told yet.
     pub(crate) fn tell_lost(&mut self, channels: &[Arc<ChannelState>]) -> Result<(), DiskError> {
-        let lost: Vec<u64> = channels.iter().map(|channel| channel.lost()).collect();
-        if lost.iter().sum::<u64>() == self.lost_told.iter().sum::<u64>() {
+        let lost: Vec<Losses> = channels.iter().map(|channel| channel.losses()).collect();
+        if is_told(&lost, &self.lost_told) {
             return Ok(());
         }
-        let before = self.lost_before.iter().chain(std::iter::repeat(&0));
-        let counts = lost.iter().zip(before).map(|(lost, before)| lost - before);
-        let texts: BTreeMap<String, String> = channels
-            .iter()
-            .zip(counts)
-            .filter(|(_, count)| *count > 0)
-            .map(|(channel, count)| (channel.topic.clone(), count.to_string()))
-            .collect();
-        self.file.metadata(metadata::LOST, &texts)?;
+        let (mut counts, mut causes) = (BTreeMap::new(), BTreeMap::new());
+        for (at, channel) in channels.iter().enumerate() {
+            let new = lost[at].since(&self.lost_before.get(at).copied().unwrap_or_default());
+            if new != Losses::default() {
+                counts.insert(channel.topic.clone(), new.all().to_string());
+                causes.extend(new.texts(&channel.topic));
+            }
+        }
+        self.file.metadata(metadata::LOST, &counts)?;
+        self.file.metadata(metadata::LOST_BY, &causes)?;
         self.file.end_chunk()?;
         self.lost_told = lost;
         Ok(())
@@ -259,18 +270,24 @@ impl Current {
     }
 
     /// Earlier files tell these losses: the one before it was still open when it was made.
-    pub(crate) fn follow(&mut self, lost_before: Vec<u64>) {
+    pub(crate) fn follow(&mut self, lost_before: Vec<Losses>) {
         self.lost_told = lost_before.clone();
         self.lost_before = lost_before;
     }
 
     /// Losses that files tell, if this one is kept.
-    pub(crate) fn lost_told(&self) -> &[u64] {
+    pub(crate) fn lost_told(&self) -> &[Losses] {
         &self.lost_told
     }
 
     /// Losses that files tell without this one.
-    pub(crate) fn lost_before(&self) -> &[u64] {
+    pub(crate) fn lost_before(&self) -> &[Losses] {
         &self.lost_before
     }
+}
+
+/// Whether these losses of the channels are what was told. A channel that is new has none.
+pub(crate) fn is_told(lost: &[Losses], told: &[Losses]) -> bool {
+    let all = |losses: &[Losses]| losses.iter().map(Losses::all).fold(0, u64::saturating_add);
+    all(lost) == all(told)
 }

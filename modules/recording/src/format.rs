@@ -40,6 +40,9 @@ pub mod metadata {
     pub const EPOCH: &str = "rohrpost.epoch";
     /// Messages that are not in the file: a count for each topic, from the file's beginning. The last one counts.
     pub const LOST: &str = "rohrpost.lost";
+    /// Why they are not in it: a count for each topic and [cause](crate::LossCause::name), with a blank between both,
+    /// as in [`LOST`].
+    pub const LOST_BY: &str = "rohrpost.lost-by";
     /// A mark that was set while it was recorded: `text`, `time-ns`, `epoch`.
     pub const MARK: &str = "rohrpost.mark";
     /// The file was closed: `reason`.

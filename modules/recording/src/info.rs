@@ -4,6 +4,7 @@ use crate::damages::Damages;
 use crate::described::DescribedModule;
 use crate::error::{Damage, ReadError};
 use crate::format::{self, key, metadata};
+use crate::loss::Losses;
 use crate::order::Mark;
 use crate::read::contents::{Contents, Ending, Item};
 use crate::read::definitions::{ChannelIdentity, Definition};
@@ -48,6 +49,8 @@ pub struct Info {
     pub lost: u64,
     /// When what it begins with is played, in nanoseconds of system time: also what is repeated.
     pub begins_ns: Option<u64>,
+    /// Why they are not, as far as the file tells.
+    pub losses: Losses,
     /// When the first message came, in nanoseconds of system time.
     pub first_ns: Option<u64>,
     /// When the last one came; not before the first.
@@ -110,6 +113,8 @@ pub struct ChannelInfo {
     pub repeated: u64,
     /// Messages that should be here, and are not.
     pub lost: u64,
+    /// Why they are not, as far as the file tells.
+    pub losses: Losses,
     /// When the first one came.
     pub first_ns: Option<u64>,
     /// When the last one came.
@@ -271,6 +276,7 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
         repeated: 0,
         lost: 0,
         begins_ns: None,
+        losses: Losses::default(),
         first_ns: None,
         last_ns: None,
         channels: Vec::new(),
@@ -283,7 +289,7 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
         described: Vec::new(),
         others: Vec::new(),
     };
-    let (mut lost, mut memory) = (BTreeMap::new(), definitions.memory());
+    let (mut lost, mut losses, mut memory) = (BTreeMap::new(), BTreeMap::new(), definitions.memory());
     for its in about.metadata {
         let is_heeded = contents.heeds(&its);
         let Metadata { name, metadata: mut texts } = its;
@@ -292,6 +298,7 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
             metadata::SESSION if info.session.is_empty() => info.session = foreign(texts),
             metadata::CONFIGURATION => info.add_configuration(texts),
             metadata::LOST => lost = format::counts(&texts),
+            metadata::LOST_BY => losses = Losses::of_texts(&texts),
             metadata::CLOSED => info.closed_because = texts.remove("reason").map(ForeignText::from),
             // Epochs are told by the channels.
             metadata::EPOCH => {}
@@ -342,6 +349,8 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
             channels.insert(at, ChannelInfo { topic: topic.as_str().into(), ..ChannelInfo::default() });
         }
         channels[at].lost = *count;
+        channels[at].losses = losses.get(topic).copied().unwrap_or_default();
+        info.losses += channels[at].losses;
     }
     (info.first_ns, info.last_ns) = times.unzip();
     info.begins_ns = all_times.map(|(first_ns, _)| first_ns);

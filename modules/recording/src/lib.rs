@@ -11,7 +11,8 @@
 //! ```
 //!
 //! [`Writer::write`] takes as long as copying the message, whatever the disk does. What does not fit the bounded queue
-//! is counted as lost, by channel, in [`Status`] and in the file. A process that is killed loses what had not left its
+//! is counted as lost, by channel and cause, in [`Status`] and in the file. A channel never takes more of the queue
+//! than is free: one that floods it leaves room to the others. A process that is killed loses what had not left its
 //! memory: at most [`Options::flush`]. A loss of power takes what was not synced: at most [`Options::sync`] more.
 //!
 //! ```
@@ -71,11 +72,12 @@ mod error;
 pub mod format;
 mod inbox;
 mod info;
+mod loss;
 mod merge;
 mod newest;
 mod options;
 mod order;
-
+mod pace;
 mod part_file;
 mod player;
 mod read;
@@ -101,10 +103,12 @@ pub use disk::is_being_written;
 pub use drawn::{DrawError, DrawOptions, Drawn, DrawnBeside, draw};
 pub use error::{Damage, DiskError, FileLimit, ReadError, RewriteError, Shown};
 pub use info::{AttachmentInfo, ChannelInfo, EpochInfo, ForeignTexts, Info, info};
+pub use loss::{LossCause, Losses};
 pub use merge::{MergeError, merge};
 pub use newest::Earlier;
 pub use options::{Options, Session};
 pub use order::{FileChange, MARK_BYTES_MAX, Mark, OrderError, PendingOrder};
+pub use pace::Pace;
 pub use part_file::PartFile;
 pub use player::{Cue, Player};
 pub use read::last::{LastMessage, last_message};

@@ -71,19 +71,23 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
         source.advance(&mut new)?;
         progress(sources.iter().map(|source| source.contents.at()).sum(), bytes);
     }
-    let mut lost: BTreeMap<String, u64> = BTreeMap::new();
+    let mut losses: [BTreeMap<String, u64>; 2] = Default::default();
     for source in sources {
         for (id, channel) in source.contents.definitions().channels() {
             new.channel(source.number, id, &unified(channel, &types)).map_err(RewriteError::from)?;
         }
-        for (topic, count) in source.lost {
-            let all = lost.entry(topic).or_default();
-            *all = all.saturating_add(count);
+        for (all, of_source) in losses.iter_mut().zip([source.lost, source.lost_by]) {
+            for (key, count) in of_source {
+                let sum = all.entry(key).or_default();
+                *sum = sum.saturating_add(count);
+            }
         }
     }
-    if !lost.is_empty() {
-        let texts = lost.into_iter().map(|(topic, count)| (topic, count.to_string()));
-        new.metadata(metadata::LOST, &texts.collect()).map_err(RewriteError::from)?;
+    for (name, all) in [metadata::LOST, metadata::LOST_BY].into_iter().zip(losses) {
+        if !all.is_empty() {
+            let texts = all.into_iter().map(|(key, count)| (key, count.to_string()));
+            new.metadata(name, &texts.collect()).map_err(RewriteError::from)?;
+        }
     }
     let messages = new.messages();
     Ok((messages, new.finish()?))
@@ -117,12 +121,15 @@ struct Source {
     next: Option<Found>,
     /// What it says of its losses; the last counts.
     lost: BTreeMap<String, u64>,
+    /// The same with causes.
+    lost_by: BTreeMap<String, u64>,
 }
 
 impl Source {
     /// At its first message.
     fn open(number: usize, path: &Path, new: &mut Rewriter) -> Result<Self, MergeError> {
-        let mut source = Self { number, contents: Contents::open(path)?, next: None, lost: BTreeMap::new() };
+        let (lost, lost_by) = Default::default();
+        let mut source = Self { number, contents: Contents::open(path)?, next: None, lost, lost_by };
         source.advance(new)?;
         Ok(source)
     }
@@ -177,6 +184,7 @@ impl Source {
         let mut texts = its.metadata;
         match its.name.as_str() {
             metadata::LOST => self.lost = format::counts(&texts),
+            metadata::LOST_BY => self.lost_by = format::counts(&texts),
             metadata::CLOSED => {}
             metadata::CONFIGURATION => new.metadata(&its.name, &texts)?,
             name if !is_our_word(name) => new.metadata(name, &texts)?,

@@ -28,7 +28,8 @@ pub struct Options {
     pub retry: Duration,
     /// What stays free on the disk.
     pub leave_bytes: u64,
-    /// Chunks of up to a megabyte that wait in memory while the disk is slow; what comes then is lost, and counted.
+    /// Room for so many chunks of a megabyte, which wait in memory while the disk is slow. A channel takes half of it
+    /// at most, and never more than is free then; what finds no room is lost, and counted.
     pub queue_chunks: usize,
     /// What other programs draw is in the same files.
     pub drawn: Option<DrawnBeside>,
@@ -47,7 +48,7 @@ impl Options {
             sync: Duration::from_secs(2),
             retry: Duration::from_secs(1),
             leave_bytes: 256 << 20,
-            queue_chunks: 32,
+            queue_chunks: 64,
             drawn: None,
         }
     }

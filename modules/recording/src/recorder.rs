@@ -14,12 +14,13 @@
 mod orders;
 
 use crate::batch::Batch;
-use crate::current::Current;
+use crate::current::{Current, is_told};
 use crate::described::DescribedModule;
 use crate::disk::Disk;
 use crate::error::{DiskError, Shown};
 use crate::format::metadata;
 use crate::inbox::Taken;
+use crate::loss::{LossCause, Losses};
 use crate::newest::{Earlier, Newest};
 use crate::options::{Options, Session};
 use crate::rotate;
@@ -56,7 +57,7 @@ pub(crate) struct Recorder {
     /// Not before then is the disk tried again.
     retry_at: Option<Instant>,
     /// Losses of each channel that files tell.
-    lost_told: Vec<u64>,
+    lost_told: Vec<Losses>,
     /// The newest that was seen: channels without a message yet are described with it.
     epoch: u64,
 }
@@ -102,6 +103,9 @@ impl Recorder {
                 }
                 self.resume(Instant::now());
                 continue;
+            }
+            if !self.shared.inbox.is_late() {
+                self.shared.begin_pace();
             }
             match self.shared.inbox.take(self.options.flush) {
                 Taken::Batch(batch) => self.write(batch),
@@ -176,7 +180,7 @@ impl Recorder {
             current.begin(&self.newest, batch, &self.channels)?;
             // Before the messages behind the gap: whatever is read of them, the file tells what is missing.
             current.tell_lost(&self.channels)?;
-            current.write(batch, &self.channels)?;
+            current.write(batch, &self.channels, self.shared.inbox.is_pressed())?;
             self.shared.counts().bytes_now = current.file.bytes();
         }
         Ok(())
@@ -381,13 +385,13 @@ impl Recorder {
     /// Losses that no file tells, as the last one was closed before, have one more.
     fn opened_to_tell(&mut self, is_failing: bool) -> Result<(), DiskError> {
         self.learn_channels();
-        let lost: u64 = self.channels.iter().map(|channel| channel.lost()).sum();
-        if is_failing || lost == self.lost_told.iter().sum::<u64>() { Ok(()) } else { self.opened(Instant::now()) }
+        let lost: Vec<Losses> = self.channels.iter().map(|channel| channel.losses()).collect();
+        if is_failing || is_told(&lost, &self.lost_told) { Ok(()) } else { self.opened(Instant::now()) }
     }
 
     fn lose(&mut self, batch: &Batch) {
         self.learn_channels();
-        batch.messages().for_each(|(at, _)| self.channels[at].count_lost(1));
+        batch.messages().for_each(|(at, _)| self.channels[at].count_lost(LossCause::Disk, 1));
         // It is newer than what was written: the next recording does not begin with an older value.
         self.newest.note(batch, &self.channels);
     }

@@ -2,7 +2,9 @@
 
 use crate::described::DescribedModule;
 use crate::inbox::Inbox;
+use crate::loss::{LossCause, Losses};
 use crate::newest::Earlier;
+use crate::pace::Pace;
 use crate::status::{ChannelState, Counts, Status};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -12,6 +14,8 @@ pub(crate) struct Shared {
     channels: Mutex<Vec<Arc<ChannelState>>>,
     described: Mutex<Vec<Arc<DescribedModule>>>,
     counts: Mutex<Counts>,
+    /// Of the thread, since nothing waited for it.
+    pace: Mutex<Option<Pace>>,
     /// Of a recording that has ended.
     newest: Mutex<Option<Earlier>>,
 }
@@ -19,7 +23,7 @@ pub(crate) struct Shared {
 impl Shared {
     pub(crate) fn new(inbox: Inbox) -> Self {
         let (channels, described) = (Mutex::default(), Mutex::default());
-        Self { inbox, channels, described, counts: Mutex::default(), newest: Mutex::default() }
+        Self { inbox, channels, described, counts: Mutex::default(), pace: Mutex::default(), newest: Mutex::default() }
     }
 
     pub(crate) fn add(&self, channel: Arc<ChannelState>) {
@@ -52,8 +56,25 @@ impl Shared {
         self.counts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The thread has nothing to do just now.
+    pub(crate) fn begin_pace(&self) {
+        let mut pace = self.pace.lock().unwrap_or_else(PoisonError::into_inner);
+        pace.get_or_insert_with(Pace::of_this_thread).begin();
+    }
+
+    /// Why there is no room for what comes.
+    pub(crate) fn why_full(&self) -> LossCause {
+        if self.counts().problem.is_some() {
+            return LossCause::Disk;
+        }
+        let pace = self.pace.lock().unwrap_or_else(PoisonError::into_inner);
+        pace.as_ref().map_or(LossCause::Processor, Pace::cause_beside_disk)
+    }
+
     pub(crate) fn status(&self, is_running: bool) -> Status {
         let channels: Vec<_> = self.channels_from(0).iter().map(|channel| channel.status()).collect();
+        let mut losses = Losses::default();
+        channels.iter().for_each(|channel| losses += channel.losses);
         let now = self.counts().clone();
         Status {
             file: now.file,
@@ -63,7 +84,8 @@ impl Shared {
             written: now.written,
             synced: now.synced,
             unsure: now.unsure,
-            lost: channels.iter().map(|channel| channel.lost).sum(),
+            lost: losses.all(),
+            losses,
             waiting: self.inbox.waiting() + now.held,
             problem: now.problem,
             failures: now.failures,

@@ -1,6 +1,7 @@
 //! How a recording goes: counted by the thread that writes, read by anything.
 
 use crate::error::DiskError;
+use crate::loss::{LossCause, LossCounters, Losses};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -28,6 +29,8 @@ pub struct Status {
     pub unsure: u64,
     /// Messages that are in no file and will not be, with those lost before they came here.
     pub lost: u64,
+    /// Why they are.
+    pub losses: Losses,
     /// Messages in memory.
     pub waiting: u64,
     /// What is wrong now. Nothing is written until it is over, and messages wait in memory.
@@ -53,6 +56,8 @@ pub struct ChannelStatus {
     pub written: u64,
     /// In no file.
     pub lost: u64,
+    /// Why they are in none.
+    pub losses: Losses,
 }
 
 /// Why nothing is written.
@@ -136,7 +141,7 @@ pub(crate) struct ChannelState {
     pub(crate) type_hash: u32,
     pub(crate) texts: BTreeMap<String, String>,
     written: AtomicU64,
-    lost: AtomicU64,
+    lost: LossCounters,
 }
 
 impl ChannelState {
@@ -145,23 +150,24 @@ impl ChannelState {
         (schema_name, schema, type_hash): (String, Vec<u8>, u32),
         texts: BTreeMap<String, String>,
     ) -> Self {
-        let zero = AtomicU64::default;
-        Self { topic, schema_name, schema, type_hash, texts, written: zero(), lost: zero() }
+        let (written, lost) = (AtomicU64::default(), LossCounters::default());
+        Self { topic, schema_name, schema, type_hash, texts, written, lost }
     }
 
     pub(crate) fn count_written(&self) {
         self.written.fetch_add(1, Relaxed);
     }
 
-    pub(crate) fn count_lost(&self, count: u64) {
-        self.lost.fetch_add(count, Relaxed);
+    pub(crate) fn count_lost(&self, cause: LossCause, count: u64) {
+        self.lost.count(cause, count);
     }
 
-    pub(crate) fn lost(&self) -> u64 {
-        self.lost.load(Relaxed)
+    pub(crate) fn losses(&self) -> Losses {
+        self.lost.read()
     }
 
     pub(crate) fn status(&self) -> ChannelStatus {
-        ChannelStatus { topic: self.topic.clone(), written: self.written.load(Relaxed), lost: self.lost() }
+        let losses = self.losses();
+        ChannelStatus { topic: self.topic.clone(), written: self.written.load(Relaxed), lost: losses.all(), losses }
     }
 }

@@ -6,6 +6,7 @@ use crate::disk::{Disk, RealDisk};
 use crate::error::DiskError;
 use crate::format::{MESSAGE_BYTES_MAX, key, topic};
 use crate::inbox::Inbox;
+use crate::loss::LossCause;
 use crate::newest::{Earlier, Newest};
 use crate::options::{Options, Session};
 use crate::order::{Mark, Order, OrderError, OrderKind, PendingOrder};
@@ -82,9 +83,9 @@ pub struct OtherInterface {
 /// Why a message is not recorded. It is counted as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum WriteError {
-    /// The disk is too slow, or does not take anything: see [`Status::problem`].
-    #[error("the queue is full: the disk is slower than what comes, or fails (see the status)")]
-    Full,
+    /// What comes is not written as fast, and its channel has its share of the queue.
+    #[error("no room in the queue: {} (see the status)", .0.text())]
+    Full(LossCause),
     /// Longer than a message can be.
     #[error("a message of {0} bytes; a recording takes up to {MESSAGE_BYTES_MAX}")]
     Long(usize),
@@ -197,21 +198,22 @@ impl Writer {
         if channel.0 >= self.channels.len() {
             return Err(WriteError::NoChannel);
         }
-        let refused = if len > MESSAGE_BYTES_MAX {
-            WriteError::Long(len)
+        let (cause, refused) = if len > MESSAGE_BYTES_MAX {
+            (LossCause::Long, WriteError::Long(len))
         } else if self.shared.inbox.put(channel.0, message) {
             return Ok(());
         } else {
-            WriteError::Full
+            let cause = self.shared.why_full();
+            (cause, WriteError::Full(cause))
         };
-        self.count_lost(channel, 1);
+        self.count_lost(channel, cause, 1);
         Err(refused)
     }
 
     /// Messages that were lost before they came here, as a slow reader of a stream is told.
-    pub fn count_lost(&mut self, channel: ChannelId, count: u64) {
+    pub fn count_lost(&mut self, channel: ChannelId, cause: LossCause, count: u64) {
         if let Some(channel) = self.channels.get(channel.0) {
-            channel.count_lost(count);
+            channel.count_lost(cause, count);
         }
     }
 

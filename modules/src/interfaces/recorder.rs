@@ -23,10 +23,11 @@ pub struct RecordingState {
     /// Of those written, how many may be lost with the file or disk that had them.
     #[schema(unit = "messages")]
     pub unsure: u64,
-    /// Messages that are in no file: they were overwritten or found no room before they came to the recorder, or the
-    /// disk was too slow or failed.
+    /// Messages that are in no file, though they should be.
     #[schema(unit = "messages")]
     pub lost: u64,
+    /// Why they are in none.
+    pub lost_by: LostBy,
     /// Messages in memory.
     #[schema(unit = "messages")]
     pub waiting: u64,
@@ -52,6 +53,31 @@ pub struct RecordedMessages {
     /// Messages in no file.
     #[schema(unit = "messages")]
     pub lost: u64,
+    /// Why they are in none.
+    pub lost_by: LostBy,
+}
+
+/// Messages in no file, by cause.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct LostBy {
+    /// Lost between two nodes.
+    #[schema(unit = "messages")]
+    pub way: u64,
+    /// Came while no recorder ran.
+    #[schema(unit = "messages")]
+    pub away: u64,
+    /// Came faster than the recorder takes them, which had its processor.
+    #[schema(unit = "messages")]
+    pub recorder: u64,
+    /// Came while other programs had the recorder's processor.
+    #[schema(unit = "messages")]
+    pub processor: u64,
+    /// Came faster than the disk takes them, or while it failed.
+    #[schema(unit = "messages")]
+    pub disk: u64,
+    /// Longer than a recording, or the recorder's mailbox, takes.
+    #[schema(unit = "messages")]
+    pub long: u64,
 }
 
 /// Some of a recording's channels.

@@ -83,6 +83,8 @@ pub struct Context {
     pub(crate) watches: Option<Watches>,
     /// Descriptors of `open_outside`, if there is a journal.
     outside: Vec<OpenedFile>,
+    /// Nothing that came is left behind at its end.
+    pub(super) takes_all_at_end: bool,
     /// When ticks and periods are due.
     pub(crate) schedule: Schedule,
     /// What does not work, as the module itself says; empty: all does.
@@ -127,6 +129,7 @@ impl Context {
             open: Vec::new(),
             watches: None,
             outside: Vec::new(),
+            takes_all_at_end: false,
             schedule,
             complaint: String::new(),
             scratch: Vec::new(),

@@ -5,7 +5,7 @@ use super::subscribed::{Origin, Subscribed};
 use super::unreadable::Unreadable;
 use crate::common::DataHead;
 use crate::journal::{JournalEvent, ModuleJournal, NotedOrigin};
-use rohrpost_mailbox::{HeldRecord, Name, RecordPlace, Stamp, StreamId, local};
+use rohrpost_mailbox::{HeldRecord, Missed, Name, RecordPlace, Stamp, StreamId, local};
 use rohrpost_schema::{Data, View};
 
 /// Data that a subscription brought.
@@ -25,13 +25,14 @@ pub struct Received<'a> {
     pub number: u16,
     /// Mailbox it came to; 0 for a record of a stream, which comes to none.
     pub mailbox: u8,
-    /// Time, number, misses. Of a stream: the lower bits of the record's sequence, and records lost so far.
+    /// Time, number, misses. Of a stream: the lower bits of the record's sequence, and records lost so far;
+    /// what a replica leaves out on purpose is not lost.
     pub head: DataHead,
     /// The value, postcard. That of a stream's record lies in its ring.
     pub value: &'a [u8],
     origin: Origin,
-    /// The record, if it is one in a ring.
-    record: Option<&'a HeldRecord<'a>>,
+    /// The record, if it is one in a ring, and what was missed before it.
+    record: Option<(&'a HeldRecord<'a>, Missed)>,
 }
 
 impl<'a> Received<'a> {
@@ -43,15 +44,22 @@ impl<'a> Received<'a> {
         Self { from, number, mailbox, head, value, origin, record: None }
     }
 
-    /// The same, of this record.
-    pub(super) fn held(self, record: &'a HeldRecord<'a>) -> Self {
-        Self { record: Some(record), ..self }
+    /// The same, of this record, before which so much was missed.
+    pub(super) fn held(self, record: &'a HeldRecord<'a>, missed: Missed) -> Self {
+        Self { record: Some((record, missed)), ..self }
+    }
+
+    /// Records of its stream that were missed so far, by cause. For programs without a journal, as the recorder is: an
+    /// exact replay does not know it, and says 0.
+    #[doc(hidden)]
+    pub fn missed(&self) -> Missed {
+        self.record.map(|(_, missed)| missed).unwrap_or_default()
     }
 
     /// Where the value lies, if it is a stream's record: for programs in other languages that hand out a view of it.
     /// Once the module has looked, its writer may have the place.
     pub fn place(&self) -> Option<RecordPlace> {
-        self.record.map(HeldRecord::at)
+        self.record.map(|(record, _)| record.at())
     }
 
     /// As this journal is to have it.

@@ -27,6 +27,8 @@ const BURST_TIME: Duration = Duration::from_millis(2);
 /// works without pause (RLIMIT_RTTIME), and a flood, or a period too short for its work, is no reason to be ended.
 const AWAKE_MAX: Duration = Duration::from_millis(250);
 const PAUSE: Duration = Duration::from_micros(50);
+/// What a module takes in that takes all at its end.
+const LAST_MAX: Duration = Duration::from_secs(5);
 
 /// A module that runs.
 pub(crate) struct Running<M> {
@@ -211,7 +213,13 @@ impl<M: MadeModule> Running<M> {
 
     pub(super) fn end(mut self) {
         // What modules did that have ended by now waits for nobody else.
-        while self.take_records(FollowedStream::is_whole) {}
+        let (is_all, began) = (self.context.takes_all_at_end, Instant::now());
+        while (is_all && self.take_data()) | self.take_records(|stream| is_all || stream.is_whole()) {
+            // Others may go on, and faster.
+            if is_all && began.elapsed() >= LAST_MAX {
+                break;
+            }
+        }
         if self.life.state == ModuleState::On {
             self.life.work(JournalEvent::Off, &mut self.context, M::off);
         }

@@ -153,7 +153,7 @@ impl Start {
             let quiet = std::env::var(environment::QUIET_MS).ok().filter(|_| self.launcher.is_some());
             let quiet = quiet.and_then(|ms| ms.parse().ok()).map_or(Duration::ZERO, Duration::from_millis);
             output::install_quiet(&participant, &installation, self.name, self.launcher.is_some(), quiet);
-            schedule(installation.scheduling(self.name.class()));
+            schedule(installation.scheduling_of(module));
         }
         // The mailboxes themselves know numbers only.
         let receiver = |name: Name, spec: &MailboxSpec| {

@@ -108,7 +108,7 @@ pub fn draw(
     let mut drawing = Drawing::new(&selected, options)?;
     let mut new = Rewriter::create(to, &our_header(), [path])?;
     selected.each_metadata(false, |its| {
-        if options.with_original || its.name != metadata::LOST {
+        if options.with_original || ![metadata::LOST, metadata::LOST_BY].contains(&its.name.as_str()) {
             new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?;
         }
         Ok::<_, DrawError>(())

@@ -201,7 +201,7 @@ fn by_reading(
                 continue;
             }
             // Nothing was there behind the end of a file that was not closed.
-            Item::Damaged(..) | Item::Metadata(_) => continue,
+            Item::Damaged(..) | Item::Metadata(_) | Item::Attachment(_) => continue,
         };
         if its.header.log_time >= start.from_ns && !contents.definitions().are_others() {
             break;

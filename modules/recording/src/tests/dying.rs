@@ -4,7 +4,7 @@
 
 use super::support::{files, memory_folder, options, read, said, session};
 use crate::disk::{Disk, DiskFile, RealDisk};
-use crate::{ChannelSpec, Mark, Message, Options, PendingOrder, Rotation, Status, Writer};
+use crate::{ChannelSpec, LossCause, Mark, Message, Options, PendingOrder, Rotation, Status, Writer};
 use crate::{info, is_closed, recover, recovered_path};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
@@ -103,7 +103,7 @@ fn record_until_dead(disk: DyingDisk, folder: &Path) -> (Status, Vec<String>) {
         let channel = writer.channel(&spec).unwrap();
         let (arrival_ns, stamp_ns, epoch, sequence) = (one.arrival_ns, one.stamp_ns, one.epoch, one.sequence);
         if is_lost(number) {
-            writer.count_lost(channel, 1);
+            writer.count_lost(channel, LossCause::Recorder, 1);
         } else {
             writer.write(channel, &Message { arrival_ns, stamp_ns, epoch, sequence, data: &one.data }).unwrap();
         }

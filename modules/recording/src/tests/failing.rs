@@ -4,7 +4,9 @@ use super::beginning::beginning;
 use super::disks::{FailingDisk, Faults};
 use super::support::{Said, files, memory_folder, options, read, record, said, session};
 use crate::disk::{Disk, DiskFile, RealDisk};
-use crate::{ChannelSpec, DiskError, Message, Options, Rotation, Writer, info, recover, recovered_path};
+use crate::{
+    ChannelSpec, DiskError, LossCause, Message, Options, Rotation, WriteError, Writer, info, recover, recovered_path,
+};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
 use std::io;
@@ -116,6 +118,38 @@ fn what_is_to_stay_free_stays_free_and_recording_goes_on_when_there_is_room() {
     told.unwrap();
     assert_eq!((status.files_closed, status.lost), (2, 0));
     assert_eq!(found(folder.path()).0.len(), 2);
+}
+
+/// While no byte can be written, 29 bytes of a pose after each picture of 230 kB.
+#[test]
+fn what_finds_no_room_is_blamed_on_the_disk_that_fails_and_poses_find_room_beside_pictures() {
+    let folder = memory_folder();
+    let free = Arc::new(AtomicU64::new(0));
+    let options = Options { leave_bytes: 1, queue_chunks: 4, ..options(folder.path()) };
+    let mut writer = Writer::start_on(Box::new(SmallDisk(free.clone())), options, session()).unwrap();
+    let spec = |name: &'static str| ChannelSpec { name, item: "item", ty: &Type::Bytes, texts: BTreeMap::new() };
+    let [pictures, poses] = ["camera.0", "mapper.0"].map(|name| writer.channel(&spec(name)).unwrap());
+    let (picture, pose) = (vec![7; 230_400], [7; 29]);
+    let message = |sequence, data| Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence, data };
+    writer.write(poses, &message(0, &pose)).unwrap();
+    until("the problem is told", || writer.status().problem.is_some());
+    let mut refused = 0;
+    for sequence in 1..200 {
+        if let Err(error) = writer.write(pictures, &message(sequence, &picture)) {
+            assert_eq!(error, WriteError::Full(LossCause::Disk));
+            refused += 1;
+        }
+        writer.write(poses, &message(sequence, &pose)).unwrap();
+    }
+    assert!(refused > 150, "{refused}");
+    free.store(1 << 30, Relaxed);
+    until("what waits is written", || writer.status().waiting == 0);
+    let (status, told) = writer.finish();
+    told.unwrap();
+    assert_eq!((status.written + refused, status.losses[LossCause::Disk], status.lost), (399, refused, refused));
+    assert_eq!((status.channels[1].written, status.channels[1].lost), (200, 0));
+    let told = info(files(folder.path()).last().unwrap()).unwrap();
+    assert_eq!((told.lost, told.losses), (refused, status.losses));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Files are merged by time of arrival.
 
 use super::support::{Said, file_of, memory_folder, options, read, said, session};
-use crate::{ChannelSpec, MergeError, Message, Options, Writer, info, merge};
+use crate::{ChannelSpec, LossCause, MergeError, Message, Options, Writer, info, merge};
 use rohrpost_schema::{Field, Members, Named, Type};
 use std::collections::BTreeMap;
 
@@ -44,7 +44,7 @@ fn file_with(folder: &std::path::Path, stem: &str, ty: &Type, lost: u64) -> std:
     let spec = ChannelSpec { name: "motor.0", item: "state", ty, texts: BTreeMap::new() };
     let channel = writer.channel(&spec).unwrap();
     writer.write(channel, &Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence: 0, data: &[1] }).unwrap();
-    writer.count_lost(channel, lost);
+    writer.count_lost(channel, LossCause::Recorder, lost);
     writer.finish().1.unwrap();
     folder.join(format!("{stem}-0001.mcap"))
 }
@@ -67,7 +67,7 @@ fn one_name_with_two_types_is_refused_and_losses_are_summed() {
     assert!(!to.exists());
     merge(&[one, same], &to, &mut |_, _| {}).unwrap();
     let told = info(&to).unwrap();
-    assert_eq!((told.channels.len(), told.messages, told.lost), (1, 2, 7));
+    assert_eq!((told.channels.len(), told.messages, told.lost, told.losses[LossCause::Recorder]), (1, 2, 7, 7));
 }
 
 #[test]

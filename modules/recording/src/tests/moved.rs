@@ -2,7 +2,7 @@
 
 use super::support::{Said, files, memory_folder, options, read, said, session};
 use crate::disk::{Disk, DiskFile, RealDisk};
-use crate::{ChannelSpec, DiskError, Message, OrderError, Writer, info};
+use crate::{ChannelSpec, DiskError, LossCause, Message, OrderError, Writer, info};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
 use std::io;
@@ -85,18 +85,18 @@ fn a_folder_on_a_full_disk_is_refused_and_the_present_file_goes_on() {
     assert!(status.problem.is_none() && status.file.as_ref() == Some(&first), "{status:?}");
     assert_eq!((status.files_closed, status.files_torn, files(&full).len()), (0, 0, 0));
     write(&mut writer, &all[1]);
-    writer.count_lost(channel, 5);
+    writer.count_lost(channel, LossCause::Recorder, 5);
     // Numbers of the good folder go on, too.
     let second = writer.rotate().unwrap().wait(PATIENCE).unwrap().unwrap().file;
     assert_eq!(second, good.join("base-0002.mcap"));
     write(&mut writer, &all[2]);
-    writer.count_lost(channel, 2);
+    writer.count_lost(channel, LossCause::Recorder, 2);
     writes.store(i64::MAX, Relaxed);
     let told = writer.move_to(full.clone()).unwrap().wait(PATIENCE).unwrap().unwrap();
     assert_eq!((told.closed, &told.file), (Some(second.clone()), &moved));
     assert_eq!(writer.status().file.as_ref(), Some(&moved));
     write(&mut writer, &all[3]);
-    writer.count_lost(channel, 1);
+    writer.count_lost(channel, LossCause::Recorder, 1);
     let (status, told) = writer.finish();
     told.unwrap();
     assert_eq!((status.written, status.lost, status.files_closed), (4, 8, 3), "{status:?}");

@@ -3,8 +3,8 @@
 use super::support::{Said, file_of, files, memory_folder, noise, options, read, record, said};
 use crate::disk::RealDisk;
 use crate::{
-    ChannelError, ChannelSpec, DescribedModule, Message, Options, Rotation, Selection, Session, StartError, WriteError,
-    Writer, cut, info, merge, recover,
+    ChannelError, ChannelSpec, DescribedModule, LossCause, Losses, Message, Options, Rotation, Selection, Session,
+    StartError, WriteError, Writer, cut, info, merge, recover,
 };
 use proptest::prelude::*;
 use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
@@ -142,12 +142,17 @@ fn a_message_that_is_too_long_is_lost_and_counted() {
     let long = vec![0; (16 << 20) + 1];
     assert_eq!(writer.write(channel, &message(0, &long)), Err(WriteError::Long(long.len())));
     writer.write(channel, &message(1, &long[1..])).unwrap();
-    writer.count_lost(channel, 41);
+    writer.count_lost(channel, LossCause::Recorder, 41);
     let (status, told) = writer.finish();
     told.unwrap();
     assert_eq!((status.written, status.lost), (1, 42));
     let told = info(&files(folder.path())[0]).unwrap();
     assert_eq!((told.messages, told.lost, told.channels[0].lost), (1, 42, 42));
+    let of = |losses: Losses| (losses[LossCause::Long], losses[LossCause::Recorder], losses.all());
+    assert_eq!(
+        (of(status.losses), of(told.losses), of(told.channels[0].losses)),
+        ((1, 41, 42), (1, 41, 42), (1, 41, 42))
+    );
 }
 
 #[test]
@@ -191,7 +196,7 @@ fn losses_are_told_also_of_a_channel_without_messages() {
     let mut writer = Writer::start(options(folder.path()), Session::default()).unwrap();
     let spec = ChannelSpec { name: "camera.0", item: "image", ty: &Type::Bytes, texts: BTreeMap::new() };
     let channel = writer.channel(&spec).unwrap();
-    writer.count_lost(channel, 7);
+    writer.count_lost(channel, LossCause::Recorder, 7);
     writer.finish().1.unwrap();
     let told = info(&files(folder.path())[0]).unwrap();
     assert_eq!((told.messages, told.lost, told.channels[0].topic.as_str()), (0, 7, "camera.0/image"));

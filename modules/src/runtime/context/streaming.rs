@@ -258,6 +258,34 @@ impl Context {
         self.followed_streams.rewind(subscription, Some(sequence));
     }
 
+    /// As [`Context::rewind_to`] for a stream that may have gaps: what is written while the module is off is passed
+    /// over, as it is without a word.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, StreamSubscription};
+    /// # use rohrpost_modules::types::Pose;
+    /// fn go_on(context: &mut Context, poses: &StreamSubscription<Pose>, last_handled: u64) {
+    ///     context.resume_at(poses, last_handled + 1);
+    /// }
+    /// ```
+    pub fn resume_at<T>(&mut self, subscription: &StreamSubscription<T>, sequence: u64) {
+        self.journal.asked(Tag::Rewound, Question::RewoundTo(subscription.id(), sequence));
+        self.followed_streams.resume(subscription, sequence);
+    }
+
+    /// At the module's end it is given all that came to it until then: records of all streams that it follows, and
+    /// data. For modules that end after those that they listen to.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::Context;
+    /// fn begin(context: &mut Context) {
+    ///     context.take_all_at_end();
+    /// }
+    /// ```
+    pub fn take_all_at_end(&mut self) {
+        self.takes_all_at_end = true;
+    }
+
     fn open_untyped(
         &self,
         from: Name,

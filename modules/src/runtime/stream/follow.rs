@@ -6,7 +6,7 @@ use crate::common::DataHead;
 use crate::journal::JOURNAL_NAME;
 use crate::runtime::received::Received;
 use crate::runtime::subscribed::{Origin, Subscribed, seal};
-use rohrpost_mailbox::{HeldRecord, Name, Next, Source, Throttle, monotonic_ns};
+use rohrpost_mailbox::{HeldRecord, Missed, Name, Next, Source, Throttle, monotonic_ns};
 use rohrpost_schema::Data;
 use std::marker::PhantomData;
 use std::time::{Duration, Instant};
@@ -72,6 +72,8 @@ struct Notices {
     stream: String,
     /// The module that writes it.
     module: String,
+    /// What is missed so far.
+    missed: Missed,
     /// Of losses.
     throttle: Throttle,
     /// What the last refusal said, so that it is told once.
@@ -85,10 +87,21 @@ struct Notices {
 pub(crate) struct FollowedStreams {
     /// Those that are not being worked off.
     pub(in crate::runtime) list: Vec<FollowedStream>,
-    /// To be rewound once they are not being worked off, and to which sequence.
-    rewound: Vec<(u16, Option<u64>)>,
+    /// To be rewound once they are not being worked off, and to where.
+    rewound: Vec<(u16, Rewind)>,
     /// Ever made.
     made: u16,
+}
+
+/// Where a followed stream goes on.
+#[derive(Clone, Copy)]
+enum Rewind {
+    /// At the oldest record that is kept of its present writer, and nothing of it is to be missing.
+    Oldest,
+    /// At this sequence, and nothing of it is to be missing.
+    Whole(u64),
+    /// At this sequence.
+    Resume(u64),
 }
 
 /// What a followed stream has for the module.
@@ -107,8 +120,8 @@ pub(in crate::runtime) struct FollowedRecord<'a> {
     source: &'a Followed,
     /// Which subscription.
     id: u16,
-    /// Records lost until now.
-    lost: u64,
+    /// Missed until now.
+    missed: Missed,
 }
 
 impl FollowedRecord<'_> {
@@ -117,12 +130,12 @@ impl FollowedRecord<'_> {
         let head = DataHead {
             stamp_ns: info.stamp.ns,
             sequence: info.sequence as u32,
-            missed: u32::try_from(self.lost).unwrap_or(u32::MAX),
+            missed: u32::try_from(lost(&self.missed)).unwrap_or(u32::MAX),
             incarnation: 0,
         };
         let (from, number) = (self.source.id.name, self.source.id.number);
         let origin = Origin::Stream { id: self.id, stamp: info.stamp, is_recorded: self.source.is_recorded };
-        Received::new(from, number, origin, head, self.held.body()).held(&self.held)
+        Received::new(from, number, origin, head, self.held.body()).held(&self.held, self.missed)
     }
 }
 
@@ -137,13 +150,23 @@ impl FollowedStreams {
             // From its beginning on, as far as it is there.
             reader.reader.seek(0);
         }
-        let notices = Notices { stream, module, throttle: Throttle::default(), refusal: None, retry: None };
+        let (missed, throttle) = (Missed::default(), Throttle::default());
+        let notices = Notices { stream, module, missed, throttle, refusal: None, retry: None };
         self.list.push(FollowedStream { reader, id, is_whole, notices });
         Some(StreamSubscription { id, data: PhantomData })
     }
 
     /// Goes back to this sequence; without one, to the oldest record that a stream keeps of its present writer.
     pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>, to: Option<u64>) {
+        self.go(of, to.map_or(Rewind::Oldest, Rewind::Whole));
+    }
+
+    /// Goes on from this sequence; later, what is written while the module is off is passed over.
+    pub(in crate::runtime) fn resume<T>(&mut self, of: &StreamSubscription<T>, sequence: u64) {
+        self.go(of, Rewind::Resume(sequence));
+    }
+
+    fn go<T>(&mut self, of: &StreamSubscription<T>, to: Rewind) {
         match self.list.iter_mut().find(|stream| stream.id == of.id) {
             Some(stream) => stream.rewind(to),
             None => self.rewound.push((of.id, to)),
@@ -176,12 +199,12 @@ impl FollowedStreams {
     /// For each the publisher, the number of the data, records received and records lost.
     pub(in crate::runtime) fn tallies(&self) -> impl Iterator<Item = (Name, u16, u64, u64)> {
         self.list.iter().map(|stream| {
-            let (id, (came, lost)) = (stream.reader.source.id, stream.reader.reader.accounts());
-            (id.name, id.number, came, lost)
+            let (id, reader) = (stream.reader.source.id, &stream.reader.reader);
+            (id.name, id.number, reader.accounts().0, lost(&reader.missed()))
         })
     }
 
-    /// Records that were overwritten before the module came to them.
+    /// Records that did not come to this node, or were overwritten before the module came to them.
     pub(in crate::runtime) fn lost(&self) -> u64 {
         self.tallies().map(|(_, _, _, lost)| lost).sum()
     }
@@ -215,11 +238,11 @@ impl FollowedStream {
         self.is_whole
     }
 
-    fn rewind(&mut self, to: Option<u64>) {
-        self.is_whole = true;
+    fn rewind(&mut self, to: Rewind) {
+        self.is_whole |= !matches!(to, Rewind::Resume(_));
         match to {
-            Some(sequence) => self.reader.reader.seek(sequence),
-            None => self.reader.rewind(),
+            Rewind::Whole(sequence) | Rewind::Resume(sequence) => self.reader.reader.seek(sequence),
+            Rewind::Oldest => self.reader.rewind(),
         }
     }
 
@@ -230,16 +253,17 @@ impl FollowedStream {
             return Step::Nothing;
         }
         notices.retry = None;
-        let (id, (_, lost)) = (*id, reader.reader.accounts());
+        // Of what is lost, this is all before the next record.
+        let (id, missed) = (*id, reader.reader.missed());
+        if lost(&missed) != lost(&notices.missed) {
+            notices.tell_missed(missed);
+        }
         match reader.next() {
             Ok(Next::Record((held, source))) => {
                 notices.refusal = None;
-                Step::Record(FollowedRecord { held, source, id, lost })
+                Step::Record(FollowedRecord { held, source, id, missed })
             }
-            Ok(Next::Lost(more)) => {
-                notices.lost(lost + more);
-                Step::Again
-            }
+            Ok(Next::Lost(_)) => Step::Again,
             Ok(Next::Nothing) => Step::Nothing,
             Err(error) => {
                 notices.refused(&error);
@@ -250,21 +274,37 @@ impl FollowedStream {
     }
 }
 
+/// What a replica leaves out on purpose is not lost.
+fn lost(missed: &Missed) -> u64 {
+    missed.lost.saturating_add(missed.passed_over)
+}
+
 impl Notices {
     #[cold]
-    fn lost(&mut self, lost: u64) {
-        if self.throttle.note(monotonic_ns(), TELL_EVERY_NS).is_some() {
-            let Self { stream, module, .. } = self;
-            let remedy = if stream == JOURNAL_NAME {
-                format!("it is replayed exactly up to there, and no further; let {module} take and say less at once")
-            } else {
-                format!("raise `keep` in [module.stream.{stream}] of {module}, or read only the newest")
-            };
-            tracing::warn!(
-                "{lost} records of stream `{stream}` of {module} were overwritten before this module came to them: it \
-                 is slower than they are written; {remedy}"
+    fn tell_missed(&mut self, missed: Missed) {
+        let new = missed.since(&self.missed);
+        self.missed = missed;
+        if self.throttle.note(monotonic_ns(), TELL_EVERY_NS).is_none() {
+            return;
+        }
+        let Self { stream, module, .. } = self;
+        if new.passed_over == 0 {
+            let lost = missed.lost;
+            return tracing::warn!(
+                "{lost} records of stream `{stream}` of {module} were lost on the way to this node; `rohrpost net` \
+                 says where"
             );
         }
+        let remedy = if stream == JOURNAL_NAME {
+            format!("it is replayed exactly up to there, and no further; let {module} take and say less at once")
+        } else {
+            format!("raise `keep` in [module.stream.{stream}] of {module}, or read only the newest")
+        };
+        tracing::warn!(
+            "{} records of stream `{stream}` of {module} were overwritten before this module came to them: it is \
+             slower than they are written; {remedy}",
+            missed.passed_over
+        );
     }
 
     #[cold]
