@@ -13,6 +13,8 @@ const LOSSES: Duration = Duration::from_secs(10);
 pub(super) struct Health {
     /// Which kind of error, while it lasts.
     problem: Option<Discriminant<DiskError>>,
+    /// The first of that kind in words, since each try may name another file; empty: there is none.
+    complaint: String,
     /// Messages lost when it began.
     lost_before: u64,
     /// Messages lost that were told.
@@ -27,6 +29,7 @@ impl Health {
         let problem = status.problem.as_ref().map(|problem| &problem.error);
         match problem {
             Some(error) if self.problem != Some(discriminant(error)) => {
+                self.complaint = format!("records nothing: {error}");
                 tracing::error!(errno = errno_of(error), "records nothing: {error}; tries again every second");
                 if self.problem.is_none() {
                     self.lost_before = status.lost;
@@ -40,6 +43,14 @@ impl Health {
             _ => self.losses(status, now),
         }
         self.problem = problem.map(discriminant);
+        if self.problem.is_none() {
+            self.complaint.clear();
+        }
+    }
+
+    /// What is wrong with it now.
+    pub(super) fn complaint(&self) -> &str {
+        &self.complaint
     }
 
     /// Those while the disk takes what it is given.

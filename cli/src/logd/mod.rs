@@ -141,9 +141,8 @@ impl Module for Logd {
             self.health.tell(status, Instant::now());
         }
         context.complain(match &status {
-            None => "records nothing: log control has switched it off".into(),
-            Some(Status { problem: Some(problem), .. }) => format!("records nothing: {}", problem.error),
-            Some(_) => String::new(),
+            None => "records nothing: log control has switched it off",
+            Some(_) => self.health.complaint(),
         });
         context.publish_now(RecorderInterface::STATE, &status.as_ref().map(state).unwrap_or_default())?;
         self.control.open(context, Instant::now());
