@@ -87,8 +87,8 @@ impl Page<'_> {
         self.installation.classes.format(name)
     }
 
-    fn names(&self, names: impl Iterator<Item = Name>) -> String {
-        let names: Vec<String> = names.map(|name| self.name(name)).collect();
+    fn names(&self, names: impl IntoIterator<Item = Name>) -> String {
+        let names: Vec<String> = names.into_iter().map(|name| self.name(name)).collect();
         if names.is_empty() { "nobody".into() } else { names.join(", ") }
     }
 
@@ -239,22 +239,19 @@ impl Page<'_> {
     fn module(&mut self, module: &Module) {
         let class = module.name.class();
         self.line("");
-        self.line(format!(
-            "{}  priority {}, {}",
-            self.name(module.name),
-            class.0,
-            self.installation.scheduling_of(module)
-        ));
+        let (name, scheduling) = (self.name(module.name), self.installation.scheduling_of(module));
+        self.line(format!("{name}  priority {}, {scheduling}", class.0));
         if !module.aliases.is_empty() {
             self.entry("is also", &self.names(module.aliases.iter().copied()));
         }
         self.entry("runs", &runs(module));
         self.entry("starts", &starts(module));
         self.entry("when it ends", &restart(&module.restart));
-        let calls = |name: &Name| !module.downwards.subscribes(*name);
-        self.entry("calls", &self.names(module.calls.iter().copied().filter(calls)));
-        if module.calls.iter().any(|name| !calls(name)) {
-            self.entry("subscribes", &self.names(module.calls.iter().copied().filter(|name| !calls(name))));
+        let subscribes = |name: &Name| module.downwards.subscribes(*name);
+        let (subscribed, called): (Vec<Name>, Vec<Name>) = module.calls.iter().partition(|name| subscribes(name));
+        self.entry("calls", &self.names(called));
+        if !subscribed.is_empty() {
+            self.entry("subscribes", &self.names(subscribed));
         }
         for to in &module.calls {
             if let Some(Downwards::Although(why)) = module.downwards.why(*to) {

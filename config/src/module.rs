@@ -230,12 +230,14 @@ impl Context<'_> {
         let streams = StreamSpec::read_all(section.section("stream", &format!("{what}, stream")), &what);
         let line = section.line;
         section.finish();
+        let program = program?;
+        let is_recorder = program == Program::Builtin(RECORDER.into());
         let module = Module {
             name: name?,
             aliases,
             node: node?,
-            stop_within: stop_within.unwrap_or(crate::stopping::usual(program.as_ref()?)),
-            program: program?,
+            stop_within: stop_within.unwrap_or(crate::stopping::usual(is_recorder)),
+            program,
             optional,
             required,
             calls: calls.names,

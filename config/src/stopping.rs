@@ -1,6 +1,5 @@
 //! How long a module may take to end, if the file does not say.
 
-use crate::module::{Program, RECORDER};
 use std::time::Duration;
 
 /// See [`Module::stop_within`](crate::Module::stop_within).
@@ -8,7 +7,7 @@ pub(crate) const USUAL: Duration = Duration::from_secs(2);
 /// A recorder writes what waits in its memory before it ends, on a disk that may be slow.
 const OF_RECORDER: Duration = Duration::from_secs(60);
 
-/// That of a module with this program.
-pub(crate) fn usual(program: &Program) -> Duration {
-    if *program == Program::Builtin(RECORDER.into()) { OF_RECORDER } else { USUAL }
+/// That of a recorder, or of another module.
+pub(crate) fn usual(is_recorder: bool) -> Duration {
+    if is_recorder { OF_RECORDER } else { USUAL }
 }

@@ -5,8 +5,10 @@ use crate::exact::count;
 use crate::harness::{PATIENCE, Place, Robot, probe, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
+use crate::recorded::{RECORD, launched};
 use rohrpost::ToolLink;
 use rohrpost::common::GET_DATA;
+use rohrpost::interfaces::{RecorderInterface, RecordingState};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{StreamId, SystemClock, TimeSource, monotonic_ns};
 use rohrpost_modules::journal::JOURNAL_NUMBER;
@@ -191,5 +193,26 @@ fn what_a_module_does_before_the_log_begins_is_recorded_and_repeated() {
     let told = Running::start(place.command(&words)).said();
     let run: serde_json::Value = serde_json::from_str(&told.out).unwrap_or_else(|_| panic!("{told:?}"));
     assert_eq!((told.code, &run["result"]), (Some(0), &"identical".into()), "{told:?}");
+    place.assert_empty();
+}
+
+/// Then there is no time at which anything could arrive, but the recorder does its work: it looks, and says how it is.
+#[test]
+fn before_a_log_begins_modules_are_found_and_nothing_is_recorded() {
+    let place = Place::new();
+    let (mut launch, robot) = launched(&place, &["[time]\nsource = \"log\"\n", RECORD].concat());
+    let mut tool = robot.tool(PATIENCE);
+    let port = RecorderInterface::STATE;
+    // Published with each look.
+    let state: RecordingState = wait("the recorder says how it is", || {
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        let read = |bytes: &[u8]| from_bytes::<(u64, RecordingState)>(bytes);
+        let said = tool.call(robot.name("logd.0"), GET_DATA, (port.hash)(), write, read);
+        // Two feeders have two items each; and there are the collector's lines.
+        said.ok().map(|(_, state)| state).filter(|state| state.channels == 5)
+    });
+    assert_eq!((state.written, state.lost, state.waiting), (0, 0, 0), "{state:?}");
+    tool.close();
+    launch.stop();
     place.assert_empty();
 }

@@ -1,15 +1,13 @@
 //! The built-in module `logd` on a running node: all that was sent is in its files, or counted; they are whole, also
 //! after it was killed; and a disk that is not there is told, and disturbs nobody.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, RECORDED_CLASSES, Robot, program, signal, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, program, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
-use rohrpost::common::GET_DATA;
-use rohrpost::interfaces::{RecorderInterface, RecordingState};
 use rohrpost::serde::Deserialize;
-use rohrpost::wire::{append, from_bytes};
+use rohrpost::wire::from_bytes;
 use rohrpost::{Context, Module, ModuleError, data};
 use rohrpost_mailbox::StreamId;
 use rohrpost_recording::{LossCause, Reader, info, is_closed};
@@ -390,25 +388,4 @@ fn the_example_of_the_book_is_right() {
     std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
     let explained = place.say(&["check", "demo.toml"]).ok();
     assert!(explained.contains("\nRecording\n"), "{explained}");
-}
-
-/// Then there is no time at which anything could arrive, but the recorder does its work: it looks, and says how it is.
-#[test]
-fn before_a_log_begins_modules_are_found_and_nothing_is_recorded() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, &["[time]\nsource = \"log\"\n", RECORD].concat());
-    let mut tool = robot.tool(PATIENCE);
-    let port = RecorderInterface::STATE;
-    // Published with each look.
-    let state: RecordingState = wait("the recorder says how it is", || {
-        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let read = |bytes: &[u8]| from_bytes::<(u64, RecordingState)>(bytes);
-        let said = tool.call(robot.name("logd.0"), GET_DATA, (port.hash)(), write, read);
-        // Two feeders have two items each; and there are the collector's lines.
-        said.ok().map(|(_, state)| state).filter(|state| state.channels == 5)
-    });
-    assert_eq!((state.written, state.lost, state.waiting), (0, 0, 0), "{state:?}");
-    tool.close();
-    launch.stop();
-    place.assert_empty();
 }

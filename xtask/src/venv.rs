@@ -10,8 +10,8 @@ use std::process::Command;
 
 /// The package and its version, as `gui-bridge/Cargo.toml` has it.
 const PACKAGE: &str = "rerun-sdk==0.36.3";
-/// The library of the makers of the format, in Python, with what it needs to decompress, and to decode protobuf; and one
-/// that writes bags as rosbag2 does.
+/// The library of the makers of the format, in Python, with what it needs to decompress, and to decode protobuf; and
+/// one that writes bags as rosbag2 does.
 const MCAP_PACKAGES: &str = "mcap==1.6.0 mcap-protobuf-support==0.6.0 protobuf==7.36.2 rosbags==0.11.9";
 
 /// What checks the types of the client in Python, and what builds its package, with and without Rust; and numpy, since

@@ -12,8 +12,8 @@ pub(super) fn too_large(installation: &Installation) -> Vec<String> {
         let record = installation.record.as_ref()?;
         module.names().find_map(|from| record.stream(from, name))?;
         Some(format!(
-            "stream `{name}` of {} is recorded, and takes records of up to {} (line {}): a recording takes up to {}, and \
-             counts larger ones as lost; lower `record`, or write the value in parts",
+            "stream `{name}` of {} is recorded, and takes records of up to {} (line {}): a recording takes up to {}, \
+             and counts larger ones as lost; lower `record`, or write the value in parts",
             installation.classes.format(module.name),
             size(spec.record_bytes.into()),
             document.stream_line(module, name),

@@ -19,6 +19,7 @@ mod health;
 mod leftovers;
 mod obey;
 mod sampler;
+mod tap;
 mod taps;
 
 use crate::router::NoSettings;

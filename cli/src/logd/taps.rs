@@ -1,25 +1,18 @@
 //! What is recorded of which module: wanted by the configuration, described by the module, subscribed to.
 
-use super::blame::{Blame, Omitted, mailbox_losses};
+use super::blame::{Blame, mailbox_losses};
 use super::earlier::EarlierFiles;
 use super::sampler::{Lost, Numbering, Sampler};
+use super::tap::{Tap, message};
 use rohrpost::common::OutputLevel;
 use rohrpost::description::{DescriptionRequest, noted};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
-use rohrpost::output::OutputLine;
 use rohrpost::schema::{DataItem, DataKind, Description, Field, Type};
-use rohrpost::wire::from_bytes;
-use rohrpost::{
-    Context, ContextError, ModuleError, ModuleState, Moment, Name, Node, Rate, Received, StreamSubscription,
-    Subscription, SystemTime,
-};
+use rohrpost::{Context, ModuleError, ModuleState, Name, Node, Received, SystemTime};
 use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
-use rohrpost_mailbox::{StreamId, local};
-use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, WHOLE_BYTES_MAX};
-use rohrpost_recording::format::topic;
-use rohrpost_recording::{ChannelId, ChannelSpec, Earlier, Message, WriteError, Writer};
-use std::collections::BTreeMap;
+use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER};
+use rohrpost_recording::{Earlier, WriteError, Writer};
 use std::time::Instant;
 
 /// The collector's data: lines of output.
@@ -48,37 +41,6 @@ struct SourceModule {
     /// As it has described itself.
     description: Option<Description>,
     asking: DescriptionRequest,
-}
-
-/// One item of a module.
-struct Tap {
-    from: Name,
-    module: String,
-    item: DataItem,
-    /// Hash of its interface.
-    interface: u32,
-    /// What its channel says besides.
-    texts: BTreeMap<String, String>,
-    sampling: Sampling,
-    sampler: Sampler,
-    /// Its publisher is on this node.
-    is_near: bool,
-    /// It goes on behind an earlier process: what is missing before the first record went while there was none.
-    is_resumed: bool,
-    /// Lines of output: from this level on.
-    least: Option<OutputLevel>,
-    /// None: not yet, or it cannot be opened.
-    source: Option<Source>,
-    /// Why it could not be opened, or a message of it not be recorded, so that it is told once.
-    refusal: String,
-    /// Of the present writer.
-    channel: Option<ChannelId>,
-}
-
-/// How values come.
-enum Source {
-    Data(Subscription<()>),
-    Stream(StreamSubscription<()>),
 }
 
 impl Taps {
@@ -289,127 +251,6 @@ impl SourceModule {
             channel: None,
         }
     }
-}
-
-impl Tap {
-    /// Where it is recorded. A module that describes one name with two types is recorded without the second one.
-    fn open_channel(&mut self, writer: &mut Writer) {
-        let (name, item) = (&self.module, &self.item.field);
-        let opened = writer.channel(&ChannelSpec { name, item: &item.name, ty: &item.ty, texts: self.texts.clone() });
-        if let Err(error) = &opened {
-            tracing::error!("{name}/{} is not recorded: {error}", item.name);
-        }
-        self.channel = opened.ok();
-    }
-
-    /// Subscribes. A stream that has no seat left is tried again. `names_long`: journals may name long records.
-    fn open(&mut self, context: &mut Context, earlier: &EarlierFiles, names_long: bool) -> Result<(), ModuleError> {
-        let opened = match (self.sampler.numbering(), self.sampling) {
-            (Numbering::Records, _) => {
-                context.subscribe_stream_untyped(self.from, &self.item, self.interface).map(Source::Stream)
-            }
-            (Numbering::Packages, sampling) => {
-                let rate = match sampling {
-                    Sampling::Rate(rate_hz) => Rate::hz(rate_hz)?,
-                    Sampling::Each | Sampling::Every(_) => Rate::Each,
-                };
-                let number = self.item.number;
-                context.subscribe_untyped(local::DATA, self.from, number, self.interface, rate).map(Source::Data)
-            }
-        };
-        match opened {
-            Ok(source) => {
-                if let (Source::Stream(subscription), Sampling::Each | Sampling::Every(_)) = (&source, self.sampling) {
-                    self.go_back(context, subscription, earlier, names_long);
-                }
-                self.source = Some(source);
-                self.refusal.clear();
-            }
-            Err(ContextError::Read(error)) => {
-                let text = error.to_string();
-                if self.refusal != text {
-                    tracing::error!("{}/{} is not recorded yet: {text}", self.module, self.item.field.name);
-                    self.refusal = text;
-                }
-            }
-            Err(error) => return Err(error.into()),
-        }
-        Ok(())
-    }
-
-    /// Whether also those of its records are recorded that were written before the recorder came: of a journal, and of
-    /// a stream of records that journals may name.
-    fn is_whole(&self, context: &Context) -> bool {
-        if (self.sampler.numbering(), self.sampling) != (Numbering::Records, Sampling::Each) {
-            return false;
-        }
-        let info = context.link().borrow().participant().node().inspect_stream(self.id()).ok().flatten();
-        self.is_journal() || info.is_some_and(|info| info.shape.record_bytes as usize > WHOLE_BYTES_MAX)
-    }
-
-    fn id(&self) -> StreamId {
-        StreamId { name: self.from, number: self.item.number }
-    }
-
-    fn is_journal(&self) -> bool {
-        self.item.number == JOURNAL_NUMBER
-    }
-
-    /// A stream is recorded from behind the last record in a file of an earlier process on. If there is none, one of
-    /// records that journals may name is recorded from the oldest one on that is kept.
-    fn go_back(
-        &mut self,
-        context: &mut Context,
-        subscription: &StreamSubscription<()>,
-        earlier: &EarlierFiles,
-        names_long: bool,
-    ) {
-        let participant = context.link().borrow().participant().clone();
-        let is_whole = (names_long || self.is_journal()) && self.is_whole(context);
-        let behind = earlier.behind(&topic(&self.module, &self.item.field.name), &participant, self.id());
-        self.is_resumed = behind.is_some();
-        match behind {
-            Some(sequence) if is_whole => context.rewind_to(subscription, sequence),
-            Some(sequence) => context.resume_at(subscription, sequence),
-            // A journal begins with the oldest one by itself.
-            None if is_whole && !self.is_journal() => context.rewind(subscription),
-            None => {}
-        }
-    }
-
-    /// What a value is that did not come.
-    fn omitted(&self) -> Omitted {
-        match self.sampler.numbering() {
-            Numbering::Records if self.is_resumed => Omitted::EarlierRecord,
-            Numbering::Records => Omitted::Record,
-            Numbering::Packages if self.is_near => Omitted::NearPackage,
-            Numbering::Packages => Omitted::FarPackage,
-        }
-    }
-
-    fn has_brought(&self, data: &Received<'_>) -> bool {
-        match &self.source {
-            Some(Source::Data(subscription)) => data.is_of(subscription),
-            Some(Source::Stream(subscription)) => data.is_of(subscription),
-            None => false,
-        }
-    }
-
-    /// A line of output may be less important than those that are wanted. One that cannot be read is kept: it is what
-    /// came.
-    fn is_important(&self, data: &Received<'_>) -> bool {
-        let Some(least) = self.least else { return true };
-        from_bytes::<OutputLine>(data.value).map_or(true, |line| line.level <= least)
-    }
-}
-
-/// A value that came, as it is recorded.
-fn message<'a>(now: &SystemTime, data: &Received<'a>) -> Message<'a> {
-    let (epoch, stamp_ns) = match data.moment() {
-        Moment::Stamp(stamp) => (stamp.epoch, stamp.ns),
-        Moment::Ns(ns) => (now.epoch, ns),
-    };
-    Message { arrival_ns: now.ns, stamp_ns, epoch, sequence: data.head.sequence, data: data.value }
 }
 
 /// Whether the process of a module runs, and is not about to begin or to end: what it noted of itself is true then.

@@ -173,7 +173,8 @@ fn as_json(info: &Info) -> Value {
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
         "earlier_configuration": info.earlier_configuration,
-        "attachments": attachments.collect::<Vec<_>>(), "marks": marks.collect::<Vec<_>>(), "described": described.collect::<Vec<_>>(),
+        "attachments": attachments.collect::<Vec<_>>(), "marks": marks.collect::<Vec<_>>(),
+        "described": described.collect::<Vec<_>>(),
         "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),
         "damage_count": info.damage_count,
     })

@@ -1,7 +1,6 @@
 //! What goes wrong on the disk and in files.
 
-use crate::format::{DESCRIBED_BYTES_MAX, RECORD_BYTES_MAX};
-use crate::read::ordered::HELD_BYTES_MAX;
+use crate::format::{DESCRIBED_BYTES_MAX, HELD_BYTES_MAX, RECORD_BYTES_MAX};
 use rohrpost_schema::plain::{self, ForeignText};
 use std::fmt;
 use std::io;

@@ -20,9 +20,11 @@ pub const VERSION: u32 = 1;
 pub const CHUNK_BYTES_MAX: usize = 1 << 20;
 /// A message. Longer ones are refused.
 pub const MESSAGE_BYTES_MAX: usize = 16 << 20;
-/// A record that is read, and a chunk before compression: others write long ones. A reader has some of them in memory at
-/// once.
+/// A record that is read, and a chunk before compression: others write long ones. A reader has some of them in memory
+/// at once.
 pub const RECORD_BYTES_MAX: usize = 128 << 20;
+/// Messages that wait for their turn take no more memory than this.
+pub(crate) const HELD_BYTES_MAX: usize = 256 << 20;
 /// Memory for the descriptions of types, channels and modules in one file. Those of a robot take some megabytes.
 pub(crate) const DESCRIBED_BYTES_MAX: usize = 256 << 20;
 /// What a message takes besides its data: type, length, channel, sequence and two times.

@@ -58,8 +58,8 @@ pub(crate) fn extent(body: &[u8]) -> Option<u64> {
     header_bytes.checked_add(header.packed_bytes).filter(|_| is_known)
 }
 
-/// Whether this begins the body of an index of messages that is so long: channel, length of a list, its pairs of time and
-/// place.
+/// Whether this begins the body of an index of messages that is so long: channel, length of a list, its pairs of time
+/// and place.
 pub(crate) fn is_index(body: &[u8], len: u64) -> bool {
     let list_bytes = body.get(2..).and_then(<[u8]>::first_chunk).map(|bytes| u64::from(u32::from_le_bytes(*bytes)));
     list_bytes.is_some_and(|bytes| bytes % 16 == 0 && 6 + bytes == len)

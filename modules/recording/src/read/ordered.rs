@@ -9,6 +9,7 @@
 //! taken: as many are in memory as overlap in time. Among messages of one time the file's order stays.
 
 use crate::error::{Damage, FileLimit, ReadError};
+use crate::format::HELD_BYTES_MAX;
 use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::Definitions;
 use crate::read::frames::Frames;
@@ -20,8 +21,6 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::vec;
 
-/// Messages that wait for their turn take no more memory than this.
-pub(crate) const HELD_BYTES_MAX: usize = 256 << 20;
 /// Messages outside of chunks make stretches of this length.
 const STRETCH_BYTES: u64 = 1 << 20;
 /// So much is handed over at once, unless one message is longer, and so often ahead.

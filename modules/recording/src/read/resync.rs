@@ -1,8 +1,8 @@
-//! Where a file goes on behind a record whose type or length is damaged.
+//! Where a file goes on behind a record with a damaged type or length.
 //!
 //! No checksum protects these, so each byte from there on is looked at: whether a chunk, an index of messages, metadata
-//! or the end of the data begins with it. Their bodies say in a second place how long they are. What looks like one, and
-//! is none, costs a damage more, and no message: chunks have sums.
+//! or the end of the data begins with it. Their bodies say in a second place how long they are. What looks like one,
+//! and is none, costs a damage more, and no message: chunks have sums.
 
 use crate::error::ReadError;
 use crate::format::op;

@@ -1,5 +1,5 @@
-//! The conformance files of the format's makers, where they lie: each is read, and nothing of it is lost in what is made
-//! of it.
+//! The conformance files of the format's makers, where they lie: each is read, and nothing of it is lost in what is
+//! made of it.
 
 use super::features::made_of;
 use super::support::memory_folder;

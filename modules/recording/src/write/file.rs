@@ -1,8 +1,8 @@
 //! One MCAP file that is being written: chunks go to it whole, and what fails is taken back to the last whole one.
 //!
-//! A channel and its type are described in the first two chunks that use them, so that a damaged one leaves a copy. Then
-//! again whenever the file has grown by [`GROWTH`] times their bytes, so that what is behind a large damage can be read,
-//! and a file of whatever definitions grows by a few hundredths at most.
+//! A channel and its type are described in the first two chunks that use them, so that a damaged one leaves a copy.
+//! Then again whenever the file has grown by [`GROWTH`] times their bytes, so that what is behind a large damage can be
+//! read, and a file of whatever definitions grows by a few hundredths at most.
 
 use super::chunk::OpenChunk;
 use super::output::Output;

@@ -11,8 +11,8 @@ use crate::read::frames::{HEAD_BYTES, Step};
 use crate::read::resync;
 use mcap::records::Record;
 
-/// So much may be read again in a file of any length, besides twice its length: nested records could be read as often as
-/// there are bytes.
+/// So much may be read again in a file of any length, besides twice its length: nested records could be read as often
+/// as there are bytes.
 const REREAD_BYTES_MAX: u64 = 16 << 20;
 
 impl Contents {
