@@ -269,11 +269,9 @@ impl Context<'_> {
                 [only] => Some(only.name.clone()),
                 [] => None,
                 _ => {
-                    let names: Vec<String> = names().map(|name| format!("\"{name}\"")).collect();
-                    section.report(format!(
-                        "`node` is missing, and there are several; write `node = ` and one of {}",
-                        names.join(", ")
-                    ));
+                    let names = names().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+                    let right = format!("write `node = ` and one of {names}");
+                    section.report(format!("`node` is missing, and there are several; {right}"));
                     None
                 }
             };
