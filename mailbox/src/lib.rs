@@ -164,7 +164,9 @@ pub use stream::{
     STREAM_KEEP_MAX, STREAM_READERS_MAX, STREAM_SEQUENCE_MAX, Stamp, StreamError, StreamId, StreamInfo, StreamReader,
     StreamShape, StreamShapeError, StreamWriter, SuspendedRecord, WriteError,
 };
-pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
+pub use system_time::{
+    CLOCK_SET_NS, ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched,
+};
 pub use throttle::Throttle;
 pub use waiting::{Source, Waiting, wait_above, wait_any};
 pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};

@@ -28,7 +28,7 @@ const READ_TRIES: usize = 8;
 pub const ERROR_UNKNOWN_NS: u64 = i64::MAX as u64;
 const BILLION: i128 = 1_000_000_000;
 /// A computer's clock that lies so far from system time was set since system time began: a day.
-const CLOCK_SET_NS: u64 = 86_400_000_000_000;
+pub const CLOCK_SET_NS: u64 = 86_400_000_000_000;
 /// Two readings of how long a computer has slept are off by less.
 const SLEPT_NS_MIN: u64 = 5_000_000;
 

@@ -15,15 +15,16 @@ fn python(place: &Place, code: &str, keys: &str) -> String {
 
 #[test]
 fn a_mistake_that_stays_is_told_once_and_not_tried_again() {
-    let keys = "required = false";
+    const KEYS: &str = "required = false";
     let missing = "[[module]]\nname = \"pilot.0\"\nprogram = [\"sh\", \"-c\", \"exec nowhere-installed\"]\n";
-    let of_python = |code: &'static str| move |place: &Place| python(place, code, keys);
-    let cases: [(Box<dyn Fn(&Place) -> String>, &str); 5] = [
+    let of_python = |code: &'static str| move |place: &Place| python(place, code, KEYS);
+    type Entry = Box<dyn Fn(&Place) -> String>;
+    let cases: [(Entry, &str); 5] = [
         (Box::new(of_python("def hold(:")), "SyntaxError: "),
         (Box::new(of_python("import nowhere_installed")), "ModuleNotFoundError: No module named 'nowhere_installed'"),
         (Box::new(of_python("from os import not_in_there")), "ImportError: cannot import name 'not_in_there'"),
-        (Box::new(|_| format!("{missing}{keys}\n")), "nowhere-installed: not found"),
-        (Box::new(|_| probe("probe.1", "watches = \"output.0\"", keys)), "`output.0` is of class `output`, but"),
+        (Box::new(move |_| format!("{missing}{KEYS}\n")), "nowhere-installed: not found"),
+        (Box::new(|_| probe("probe.1", "watches = \"output.0\"", KEYS)), "`output.0` is of class `output`, but"),
     ];
     for (module, words) in cases {
         let place = Place::new();

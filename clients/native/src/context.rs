@@ -151,7 +151,7 @@ impl NativeContext<'_> {
         timeout: Duration,
         is_late: bool,
     ) -> Result<Option<NativeStream>, NativeError> {
-        let name = self.context.callee(module)?;
+        let name = self.context.module_named(module)?;
         self.context.require_stream(name, item)?;
         let Some(peer) = self.state.peers.described(self.context, (module, name), timeout)? else { return Ok(None) };
         let item = item_of(&peer.description, module, item, true)?;

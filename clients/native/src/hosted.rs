@@ -9,7 +9,7 @@ use crate::record::Front;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Ready};
 use rohrpost_modules::interface::{StandIn, StandInCommand};
-use rohrpost_modules::parameter::ParameterSet;
+use rohrpost_modules::parameter::{ParameterSet, Refusal};
 use rohrpost_modules::runtime::{Context, Received, Start, StartError, run_described};
 use rohrpost_modules::{CommandFailure, MadeModule, ModuleError};
 use rohrpost_schema::Value;
@@ -51,14 +51,18 @@ fn served(installation: &Installation, module: Name, class: &str) -> Name {
     names.into_iter().find(|name| Some(name.class()) == id).unwrap_or(module)
 }
 
+/// The program, or its configuration, stays as it is: another start would end in the same way.
+fn refused(refusal: Refusal) -> ModuleError {
+    ModuleError::configuration(refusal.to_string())
+}
+
 fn state(interface: NativeInterface, settings: Settings, serves: Name) -> Result<NativeState, ModuleError> {
     let NativeInterface { description, parameters, settings: known } = interface;
-    let mut parameters = Parameters::new(parameters)?;
+    let mut parameters = Parameters::new(parameters).map_err(refused)?;
     let mut others = serde_json::Map::new();
     for (name, value) in settings {
         if parameters.has(&name) {
-            let configured = parameters.configure(&name, &value);
-            configured.map_err(|refusal| ModuleError::configuration(refusal.to_string()))?;
+            parameters.configure(&name, &value).map_err(refused)?;
         } else if known.contains(&name) {
             others.insert(name, serde_json::to_value(value)?);
         } else {

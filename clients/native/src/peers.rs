@@ -49,7 +49,11 @@ impl Peers {
         (module, name): (&str, Name),
         timeout: Duration,
     ) -> Result<Option<Rc<Peer>>, NativeError> {
-        if let Some(description) = noted(context.link().borrow().participant().node(), name) {
+        // By the journal, if there is one: the node of a replay has other modules.
+        let node = context.link().borrow().participant().node().clone();
+        let noted = || Ok(noted(&node, name).map(|its| its.to_bytes()).unwrap_or_default());
+        let description = context.take_in(noted).ok().filter(|bytes| !bytes.is_empty());
+        if let Some(description) = description.and_then(|bytes| Description::from_bytes(&bytes).ok()) {
             return Ok(Some(Rc::new(Peer { name, hash: description.hash(), description })));
         }
         let node = |name| context.installation().node_of(name);

@@ -241,6 +241,9 @@ pub enum NewEpochError {
     /// Its node is not the master of time.
     #[error("its node is not the master of time; `rohrpost time` shows which is")]
     NotMaster,
+    /// Each one has all nodes measure their clocks anew.
+    #[error("an epoch began less than 10 s ago; ask again then")]
+    TooSoon,
 }
 
 /// Declared flows that leave a node, in their order in the configuration. Counts are since its router began, and only

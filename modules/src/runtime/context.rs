@@ -327,6 +327,21 @@ impl Context {
         Ok(name)
     }
 
+    /// A module by the text of a setting, of which this one only reads streams: `calls` need not name it.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError};
+    /// fn camera(context: &Context) -> Result<rohrpost_mailbox::Name, ContextError> {
+    ///     context.module_named("camera.0")
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// When the text names no module.
+    pub fn module_named(&self, module: &str) -> Result<Name, ContextError> {
+        Ok(self.parsed(module)?.0)
+    }
+
     /// The link that proxies are made of.
     ///
     /// ```

@@ -91,13 +91,21 @@ impl Child {
 }
 
 /// Whether a process that never became a module can become none as its program is now. Of a program that its
-/// interpreter cannot read, or that misses a package, the interpreter's exit code does not tell; its last line does.
+/// interpreter cannot read, that misses a package or uses one as it must not, the interpreter's exit code does not tell;
+/// its last line does.
 fn cannot_begin(status: ExitStatus, last_line: &str) -> bool {
+    const CLASSES: [&str; 7] = [
+        "SyntaxError",
+        "IndentationError",
+        "TabError",
+        "ModuleNotFoundError",
+        "ImportError",
+        "rohrpost.errors.Misuse",
+        "rohrpost.errors.Misconfigured",
+    ];
     let error = last_line.split_once(':').map_or("", |(class, _)| class.trim());
     match status.code() {
-        Some(1) => {
-            ["SyntaxError", "IndentationError", "TabError", "ModuleNotFoundError", "ImportError"].contains(&error)
-        }
+        Some(1) => CLASSES.contains(&error),
         // Of a shell, `env` and the loader of programs: a program or a library is not there.
         Some(127) => true,
         _ => false,

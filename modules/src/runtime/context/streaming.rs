@@ -274,7 +274,7 @@ impl Context {
     }
 
     /// At the module's end it is given all that came to it until then: records of all streams that it follows, and
-    /// data. For modules that end after those that they listen to.
+    /// data, for up to 5 s: `stop-within` must be longer. For modules that end after those that they listen to.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::Context;

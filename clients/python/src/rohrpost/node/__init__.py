@@ -89,9 +89,9 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
 def _forked() -> None:
     """A child has no part in its parent's module; locks that it kept would tell that the module lives."""
     from .. import _node
-    from .output import hear
+    from .output import leave
 
-    hear(False)
+    leave()
     place = os.path.join(os.path.realpath(_node.forked()), "")
     nothing = os.open(os.devnull, os.O_RDWR | os.O_CLOEXEC)
     for number in map(int, os.listdir("/proc/self/fd")):

@@ -35,6 +35,8 @@ def _level(number: int) -> int:
     return next((at for at, level in enumerate(levels) if number >= level), len(levels))
 
 
+_PIECE = 1000
+"""Characters of a longest line: launch cuts lines behind 4096 bytes, and would take the rest for another line."""
 _SENT = "\x1e"
 """Begins a printed line that is output already: launch keeps it for what a process said last, and does not send it."""
 
@@ -53,11 +55,14 @@ class _Printed(io.TextIOWrapper):
         with self._lock:
             if not self.is_heard:
                 return super().write(text)
-            *lines, self._rest = (self._rest + text).split("\n")
-            for line in lines:
-                if line.strip():
-                    _node.say(_level(logging.INFO), line.rstrip())
-                super().write(f"{_SENT}{line}\n")
+            *lines, rest = (self._rest + text).split("\n")
+            whole = len(rest) - len(rest) % _PIECE
+            self._rest = rest[whole:]
+            for line in [*lines, *([rest[:whole]] if whole else [])]:
+                for piece in [line[at : at + _PIECE] for at in range(0, len(line), _PIECE)] or [""]:
+                    if piece.strip():
+                        _node.say(_level(logging.INFO), piece.rstrip(), None)
+                    super().write(f"{_SENT}{piece}\n")
         return len(text)
 
     def end(self) -> None:
@@ -66,6 +71,12 @@ class _Printed(io.TextIOWrapper):
             rest, self._rest, self.is_heard = self._rest, "", False
             super().write(rest)
             self.flush()
+
+    def leave(self) -> None:
+        """In a child of a fork: what its parent did not say yet, the parent says; a lock may be that of a thread that
+        is not here."""
+        self._lock = threading.RLock()
+        self._rest, self.is_heard = "", False
 
 
 _printed: _Printed | None = None
@@ -77,6 +88,12 @@ def hear(is_heard: bool) -> None:
         _printed.is_heard = True
     elif _printed is not None:
         _printed.end()
+
+
+def leave() -> None:
+    """A child of a fork prints for itself."""
+    if _printed is not None:
+        _printed.leave()
 
 
 def listen() -> None:

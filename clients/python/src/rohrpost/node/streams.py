@@ -176,14 +176,14 @@ class StreamReader:
         return _Later(lambda: self._found().stream.in_hand(find)) if opened is None else opened.stream.in_hand(find)
 
     def _next_of_late(self, timeout_s: float) -> InHand:
-        until = time.monotonic() + timeout_s
+        # By the count of looks, not by a clock: replayed exactly, it looks as often.
         left = timeout_s
-        while (opened := self._look(left)) is None:
-            left = until - time.monotonic()
+        while (opened := self._look(0.0)) is None:
             if left <= 0.0:
                 raise self._none_within(timeout_s)
             time.sleep(min(left, _LOOK_S))
-        return opened.stream.in_hand(functools.partial(self._find_next, max(0.0, until - time.monotonic())))
+            left -= _LOOK_S
+        return opened.stream.in_hand(functools.partial(self._find_next, max(0.0, left)))
 
     def _none_within(self, timeout_s: float) -> NoRecord:
         return NoRecord(f"no record of {self._what} came within {timeout_s} s")
