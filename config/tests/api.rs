@@ -261,8 +261,8 @@ fn damaged_files_give_errors_and_nothing_worse() {
 
 /// Time of the processor for this thread, whatever else the computer does.
 fn processor_ns() -> u64 {
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
-    told.split(' ').next().unwrap().parse().unwrap()
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    told.split(' ').next().and_then(|text| text.parse().ok()).unwrap_or_default()
 }
 
 #[test]
