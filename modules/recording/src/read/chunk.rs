@@ -89,6 +89,11 @@ fn unpack_checked(body: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     Ok(())
 }
 
+/// Whether it is a chunk beyond doubt: unpacked, its records have the sum that stands in it.
+pub(crate) fn is_proven(body: &[u8], records: &mut Vec<u8>) -> bool {
+    split(body).is_some_and(|(header, _)| header.sum != 0) && unpack(body, records).is_ok()
+}
+
 /// Unpacks what there is of a chunk that the file's end cuts off. No sum says that it is right.
 pub(crate) fn unpack_cut(body: &[u8], records: &mut Vec<u8>) {
     records.clear();

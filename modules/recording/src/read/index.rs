@@ -12,7 +12,7 @@ const FOOTER_BYTES: usize = 8 + 8 + 4;
 /// What a closed file says about itself.
 pub(crate) struct Index {
     pub(crate) definitions: Definitions,
-    /// In the order of the file.
+    /// These are in the order of the file, each once.
     pub(crate) chunks: Vec<ChunkIndex>,
     pub(crate) metadata: Vec<MetadataIndex>,
     pub(crate) attachments: Vec<AttachmentIndex>,
@@ -95,8 +95,10 @@ impl Index {
             (Some(damage), _) => Err(damaged(frames, damage)),
             (None, false) => Err(damaged(frames, Damage::SummarySum)),
             (None, true) => {
-                read.chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
-                let Reading { definitions, chunks, metadata, attachments, statistics, .. } = read;
+                let Reading { definitions, mut chunks, mut metadata, mut attachments, statistics, .. } = read;
+                sort_places(&mut chunks, |its| its.chunk_start_offset);
+                sort_places(&mut metadata, |its| its.offset);
+                sort_places(&mut attachments, |its| its.offset);
                 let is_checked = footer.summary_crc != 0;
                 Ok(Self { definitions, chunks, metadata, attachments, statistics, is_checked })
             }
@@ -155,6 +157,13 @@ impl Reading {
         }
         Ok(())
     }
+}
+
+/// Puts parts in the order of the file. One that is listed twice is there once, and then they are not as many as the
+/// file says it has.
+fn sort_places<T>(listed: &mut Vec<T>, place: impl Fn(&T) -> u64) {
+    listed.sort_by_key(&place);
+    listed.dedup_by_key(|its| place(its));
 }
 
 /// When the first and the last of a channel's messages in a chunk came.

@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 const OP_CHUNK: u8 = 6;
 const OP_MESSAGE: u8 = 5;
+const OP_MESSAGE_INDEX: u8 = 7;
+const OP_SCHEMA: u8 = 3;
 
 /// A compressed file of channels of one type, with these texts and a message each.
 fn write(path: &Path, channels: u16, ty: &Type, texts: &BTreeMap<String, String>) {
@@ -112,4 +114,21 @@ fn nested_records_are_not_read_as_often_as_there_are_bytes() {
     std::fs::write(&path, bytes).unwrap();
     let told = recover(&path, &folder.path().join("new.mcap"), &mut |_, _| {}).unwrap();
     assert!(told.messages == 0 && told.damage_count > 2 && told.damage_count < 200, "{told:?}");
+}
+
+/// Each of these claims to be longer than the file, which would be read to its end for each of them.
+#[test]
+fn records_that_claim_much_do_not_have_the_file_read_as_often() {
+    const TIMES: usize = 10_000;
+    const CLAIMED: u64 = 100 << 20;
+    let folder = memory_folder();
+    // Of no bytes: its body is forty zeroes.
+    let chunk = [&[OP_CHUNK][..], &CLAIMED.to_le_bytes(), &[0; 40]].concat();
+    let index = [&record(OP_MESSAGE_INDEX, &[0; 6])[..], &[OP_SCHEMA], &CLAIMED.to_le_bytes()].concat();
+    for (case, bytes) in [("chunks", chunk), ("schemas", index)] {
+        let [path, to] = ["mcap", "new"].map(|kind| folder.path().join(case).with_extension(kind));
+        std::fs::write(&path, [mcap::MAGIC, &bytes.repeat(TIMES)].concat()).unwrap();
+        let told = recover(&path, &to, &mut |_, _| {}).unwrap();
+        assert!(told.messages == 0 && told.damage_count > 2 && told.damage_count < 200, "{case}: {told:?}");
+    }
 }

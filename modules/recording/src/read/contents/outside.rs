@@ -61,6 +61,10 @@ impl Contents {
         };
         let unpacked = chunk::unpack(body, &mut self.records);
         self.resume_at = begins + HEAD_BYTES as u64;
+        if self.reads_again(self.resume_at + extent) {
+            self.ending = Some(Ending::Damaged);
+            return Ok(Some(Item::Damaged(begins, Damage::Cut)));
+        }
         self.frames.seek(self.resume_at + extent)?;
         let damage = self.enter_chunk(unpacked).err();
         Ok(Some(Item::Damaged(begins, damage.unwrap_or(Damage::Record { op: op::CHUNK }))))
@@ -71,8 +75,7 @@ impl Contents {
         let (begins, resume_at) = (self.begins, self.resume_at);
         let damaged = |damage| Some(Item::Damaged(begins, damage));
         self.ahead = None;
-        self.reread = self.reread.saturating_add(begins.saturating_sub(resume_at));
-        if self.reread > REREAD_BYTES_MAX.saturating_add(self.frames.len().saturating_mul(2)) {
+        if self.reads_again(resume_at) {
             self.ending = Some(Ending::Damaged);
             return Ok(damage.and_then(damaged));
         }
@@ -88,6 +91,12 @@ impl Contents {
                 Ok(damage.and_then(damaged))
             }
         }
+    }
+
+    /// Reading goes back from where it is to there. Whether that is too often.
+    fn reads_again(&mut self, from: u64) -> bool {
+        self.reread = self.reread.saturating_add(self.frames.at().saturating_sub(from));
+        self.reread > REREAD_BYTES_MAX.saturating_add(self.frames.len().saturating_mul(2))
     }
 
     /// What is next in the file, and whether it is a chunk that was unpacked or could not be.
@@ -115,8 +124,13 @@ impl Contents {
         let (begins, body) = (self.begins, self.frames.body());
         let len = body.len() as u64;
         // By one bit the type of a chunk, or of an index of messages, becomes another.
-        let is_other = (op != op::CHUNK && chunk::extent(body) == Some(len))
-            || (op == op::MESSAGE && self.chunks > 0 && chunk::is_index(body, len));
+        let is_other = match op {
+            op::CHUNK => false,
+            // Its data may be anything, and have a chunk's length where a chunk has that.
+            op::MESSAGE if chunk::extent(body) == Some(len) => chunk::is_proven(body, &mut self.records),
+            op::MESSAGE => self.chunks > 0 && chunk::is_index(body, len),
+            _ => chunk::extent(body) == Some(len),
+        };
         if is_other {
             return Ok(Some(Item::Damaged(begins, Damage::NoRecord { op, len })));
         }
@@ -143,7 +157,7 @@ impl Contents {
             },
             op::ATTACHMENT => {
                 let ends = self.frames.at();
-                let told = Attachment::at(&mut self.frames, begins, ends)?;
+                let told = Attachment::at(&mut self.frames, begins, ends - begins)?;
                 self.frames.seek(ends)?;
                 self.resume_at = if told.is_ok() { ends } else { self.resume_at };
                 told.map(|attachment| Some(Item::Attachment(attachment)))
