@@ -20,15 +20,22 @@ pub(crate) struct Index {
     pub(crate) statistics: Option<Statistics>,
     /// Its sum says that it is right. Others may write none.
     pub(crate) is_checked: bool,
+    /// Where the file's last record begins.
+    footer_at: u64,
 }
 
 impl Index {
-    /// Whether each message is in a chunk that is listed here. Others may write no chunks, or list none.
+    /// Whether each message is in a chunk that is listed here, and these are apart. Others may write no chunks, or list
+    /// none.
     pub(crate) fn knows_all_chunks(&self) -> bool {
         let listed = self.chunks.len() as u64;
-        self.statistics
-            .as_ref()
-            .is_some_and(|its| listed == u64::from(its.chunk_count) && (listed > 0 || its.message_count == 0))
+        let behind = self.chunks.iter().skip(1).map(|chunk| chunk.chunk_start_offset).chain([self.footer_at]);
+        let ends = |chunk: &ChunkIndex| chunk.chunk_start_offset.saturating_add(chunk.chunk_length);
+        self.chunks.iter().zip(behind).all(|(chunk, behind)| ends(chunk) <= behind)
+            && self
+                .statistics
+                .as_ref()
+                .is_some_and(|its| listed == u64::from(its.chunk_count) && (listed > 0 || its.message_count == 0))
     }
 
     /// Whether each channel with messages is described here. Others may not describe them again.
@@ -100,7 +107,7 @@ impl Index {
                 sort_places(&mut metadata, |its| its.offset);
                 sort_places(&mut attachments, |its| its.offset);
                 let is_checked = footer.summary_crc != 0;
-                Ok(Self { definitions, chunks, metadata, attachments, statistics, is_checked })
+                Ok(Self { definitions, chunks, metadata, attachments, statistics, is_checked, footer_at })
             }
         }
     }

@@ -13,13 +13,16 @@ use std::path::Path;
 const OFFSET: usize = HEAD_BYTES;
 const LENGTH: usize = OFFSET + 8;
 
-/// A file of another program with a message, metadata and an attachment.
-fn file() -> Vec<u8> {
+/// A file of another program with chunks of a message each, metadata and an attachment.
+fn file(chunks: usize) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut writer = WriteOptions::new().calculate_summary_section_crc(false).create(&mut bytes).unwrap();
     let channel_id = writer.add_channel(0, "/a", "raw", &BTreeMap::new()).unwrap();
     let header = MessageHeader { channel_id, sequence: 0, log_time: 5, publish_time: 5 };
-    writer.write_to_known_channel(&header, &[7; 50]).unwrap();
+    for _ in 0..chunks {
+        writer.write_to_known_channel(&header, &[7; 50]).unwrap();
+        writer.flush().unwrap();
+    }
     let texts = BTreeMap::from([("colour".to_owned(), "red".to_owned())]);
     writer.write_metadata(&Metadata { name: "theirs".into(), metadata: texts }).unwrap();
     let (name, media_type) = ("calib.bin".to_owned(), "application/octet-stream".to_owned());
@@ -61,7 +64,7 @@ fn an_attachment_is_as_long_as_its_record_and_ends_in_the_file() {
     const LONG: u64 = 1 << 40;
     let folder = memory_folder();
     let path = folder.path().join("a.mcap");
-    let good = file();
+    let good = file(1);
     let (record, index) = (places(&good, op::ATTACHMENT)[0], places(&good, op::ATTACHMENT_INDEX)[0]);
     let long = number(&good, index + LENGTH);
     // Two times, two texts.
@@ -93,7 +96,7 @@ fn what_is_listed_often_is_read_once() {
     let path = folder.path().join("a.mcap");
     // In the statistics: messages, schemas, channels, and then these counts.
     for (listed, count) in [(op::ATTACHMENT_INDEX, 14), (op::METADATA_INDEX, 18), (op::CHUNK_INDEX, 22)] {
-        let mut bytes = file();
+        let mut bytes = file(1);
         let count = places(&bytes, op::STATISTICS)[0] + HEAD_BYTES + count;
         assert_eq!(bytes[count..count + 4], [1, 0, 0, 0], "{listed}");
         bytes[count..count + 4].copy_from_slice(&(TIMES as u32).to_le_bytes());
@@ -112,5 +115,22 @@ fn what_is_listed_often_is_read_once() {
         let mut reader = Reader::select(&path, &Selection::default()).unwrap();
         let messages = std::iter::from_fn(|| reader.next().unwrap().map(|_| ())).count();
         assert_eq!(messages, 1, "{listed}");
+    }
+}
+
+/// Nor behind the last record. Each is read once, also in the order of time.
+#[test]
+fn a_chunk_does_not_reach_into_the_next_one() {
+    const CHUNK_LENGTH: usize = HEAD_BYTES + 24;
+    let folder = memory_folder();
+    let path = folder.path().join("a.mcap");
+    for chunk in 0..3 {
+        let mut bytes = file(3);
+        let index = places(&bytes, op::CHUNK_INDEX)[chunk];
+        set(&mut bytes, index + CHUNK_LENGTH, u64::MAX);
+        std::fs::write(&path, bytes).unwrap();
+        let mut reader = Reader::to_play(&path).unwrap();
+        let messages = std::iter::from_fn(|| reader.next().unwrap().map(|_| ())).count();
+        assert_eq!((messages, info(&path).unwrap().messages), (3, 3), "chunk {chunk}");
     }
 }
