@@ -91,8 +91,8 @@ impl Child {
 }
 
 /// Whether a process that never became a module can become none as its program is now. Of a program that its
-/// interpreter cannot read, that misses a package or uses one as it must not, the interpreter's exit code does not tell;
-/// its last line does.
+/// interpreter cannot read, that misses a package or uses one as it must not, the interpreter's exit code does not
+/// tell; its last line does.
 fn cannot_begin(status: ExitStatus, last_line: &str) -> bool {
     const CLASSES: [&str; 7] = [
         "SyntaxError",
