@@ -1,7 +1,7 @@
 //! A chunk: unpacked and checked, or unpacked as far as it goes.
 
 use crate::error::{Damage, FileLimit};
-use crate::format::RECORD_BYTES_MAX;
+use crate::format::{RECORD_BYTES_MAX, op};
 use crate::read::frames::HEAD_BYTES;
 use std::io::Read;
 use std::ops::Range;
@@ -63,6 +63,16 @@ pub(crate) fn extent(body: &[u8]) -> Option<u64> {
 pub(crate) fn is_index(body: &[u8], len: u64) -> bool {
     let list_bytes = body.get(2..).and_then(<[u8]>::first_chunk).map(|bytes| u64::from(u32::from_le_bytes(*bytes)));
     list_bytes.is_some_and(|bytes| bytes % 16 == 0 && 6 + bytes == len)
+}
+
+/// Whether a record says twice how long it is, and the same: it ends where it says.
+pub(crate) fn is_exact(op: u8, body: &[u8]) -> bool {
+    let len = body.len() as u64;
+    match op {
+        op::CHUNK => extent(body) == Some(len),
+        op::MESSAGE_INDEX => is_index(body, len),
+        _ => false,
+    }
 }
 
 /// Unpacks a chunk's records, checked by their sum: all or nothing.

@@ -22,16 +22,11 @@ impl Contents {
         let begins = self.begins;
         let behind_head = begins + HEAD_BYTES as u64;
         if let Some(unpacked) = unpacked {
-            self.resume_at = behind_head;
             return Ok(self.enter_chunk(unpacked).err().map(|damage| Item::Damaged(begins, damage)));
         }
         match step {
             Step::Record(op) => {
-                let is_exact = match op {
-                    op::CHUNK => chunk::extent(self.frames.body()) == Some(self.frames.body().len() as u64),
-                    op::MESSAGE_INDEX => chunk::is_index(self.frames.body(), self.frames.body().len() as u64),
-                    _ => false,
-                };
+                let is_exact = chunk::is_exact(op, self.frames.body());
                 self.resume_at = if is_exact { self.frames.at() } else { behind_head };
                 self.record(op)
             }
@@ -105,12 +100,13 @@ impl Contents {
             self.begins = self.frames.at();
             return Ok((self.frames.step()?, None));
         };
-        let Some(AheadRecord { begins, ends, step, mut body, unpacked }) = ahead.next() else {
+        let Some(AheadRecord { begins, ends, resume_at, step, mut body, unpacked }) = ahead.next() else {
             self.ahead = None;
             self.frames.seek(self.frames.at())?;
             return self.step();
         };
         self.begins = begins;
+        self.resume_at = resume_at.unwrap_or(self.resume_at);
         self.frames.pass_to(ends);
         match unpacked {
             Some(_) => std::mem::swap(&mut self.records, &mut body),
