@@ -22,18 +22,32 @@ pub(super) enum Omitted {
 pub(super) struct Blame {
     /// Of the thread that takes values.
     pace: Pace,
-    /// Packages that found no room in the recorder's mailbox, and are counted.
+    /// Packages that found no room in the recorder's mailbox, and are counted, or are no loss.
     refused: u64,
+    /// What came last was not to be recorded.
+    is_passing_over: bool,
 }
 
 impl Blame {
     pub(super) fn new() -> Self {
-        Self { pace: Pace::of_this_thread(), refused: 0 }
+        Self { pace: Pace::of_this_thread(), refused: 0, is_passing_over: false }
     }
 
     /// Nothing waits to be taken, or soon will not.
     pub(super) fn begin_pace(&mut self) {
         self.pace.begin();
+    }
+
+    /// A value came while nothing is recorded.
+    pub(super) fn pass_over(&mut self) {
+        self.is_passing_over = true;
+    }
+
+    /// A value came that is to be recorded. Packages that found no room while others were passed over are no loss.
+    pub(super) fn go_on(&mut self, refused: impl FnOnce() -> u64) {
+        if std::mem::take(&mut self.is_passing_over) {
+            self.refused = refused();
+        }
     }
 
     /// The causes of these losses. `refused`: packages that found no room in the recorder's mailbox so far.
@@ -82,6 +96,11 @@ mod tests {
             assert_eq!((told, count), (first, of_own), "{what:?}, {refused} refused");
             assert!(own.contains(&cause), "{cause:?}");
         }
+        blame.pass_over();
+        blame.go_on(|| 20);
+        blame.go_on(|| 21);
+        let told = blame.causes(Lost { way: 5, here: 0 }, Omitted::FarPackage, || 22);
+        assert_eq!(told.map(|(_, count)| count), [3, 2], "twenty found no room while nothing was recorded");
         let told = blame.causes(Lost { way: 1, here: 2 }, Omitted::EarlierRecord, || 0);
         assert_eq!(told, [(LossCause::Way, 1), (LossCause::Away, 2)]);
     }

@@ -127,6 +127,7 @@ impl Taps {
     pub(super) fn take(&mut self, writer: &mut Writer, context: &Context, data: &Received<'_>) {
         let Self { taps, blame, .. } = self;
         let Some(tap) = taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };
+        blame.go_on(|| mailbox_losses(context));
         let Some(channel) = tap.channel else { return };
         let (lost, is_chosen) = tap.sampler.note(&data.head, data.missed(), Instant::now());
         if lost != Lost::default() {
@@ -154,7 +155,9 @@ impl Taps {
     /// Notes a value that comes while nothing is recorded: it is no loss. The next recording may begin with it.
     pub(super) fn pass_over(&mut self, earlier: Option<&mut Earlier>, now: &SystemTime, data: &Received<'_>) {
         let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };
+        self.blame.pass_over();
         let (_, is_chosen) = tap.sampler.note(&data.head, data.missed(), Instant::now());
+        tap.is_resumed = false;
         if let (true, Some(channel), Some(earlier)) = (is_chosen, tap.channel, earlier) {
             earlier.note(channel, &message(now, data));
         }

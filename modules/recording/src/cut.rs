@@ -57,7 +57,7 @@ pub fn cut(path: &Path, to: &Path, selection: &Selection, progress: &mut Progres
     }
     let mut next = selected.next()?;
     if let Some(from_ns) = selection.from_ns {
-        let epoch = next.as_ref().map_or(u64::MAX, |found| found.channel.epoch().unwrap_or_default());
+        let epoch = next.as_ref().map(|found| found.channel.epoch().unwrap_or_default());
         let is_selected = |channel: &Definition| selection.has_channel(channel);
         let earlier = newest_before(path, &is_selected, PartStart { epoch, from_ns }, KEPT_BYTES_MAX)?;
         earlier.unread.map_or(Ok(()), Err)?;

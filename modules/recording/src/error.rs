@@ -174,7 +174,7 @@ pub enum ReadError {
 pub enum FileLimit {
     /// Descriptions of types, channels and modules.
     #[error(
-        "what it describes (types, channels, modules) takes more than {} MiB of memory, which is the limit; \
+        "what it describes (types, channels, modules, metadata) takes more than {} MiB of memory, which is the limit; \
          record fewer topics in a file",
         DESCRIBED_BYTES_MAX >> 20
     )]

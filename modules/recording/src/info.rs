@@ -1,9 +1,10 @@
 //! What is in a file.
 
+use crate::about::About;
 use crate::damages::Damages;
 use crate::described::DescribedModule;
 use crate::error::{Damage, ReadError};
-use crate::format::{self, key, metadata};
+use crate::format::{key, metadata};
 use crate::loss::Losses;
 use crate::order::Mark;
 use crate::read::contents::{Contents, Ending, Item};
@@ -215,7 +216,8 @@ fn from_index(mut frames: Frames, index: Index) -> Result<Info, ReadError> {
     let mut contents = Contents::new(frames, definitions);
     let mut about = About::default();
     for at in metadata {
-        about.metadata.push(contents.metadata_at(at.offset)?);
+        let its = contents.metadata_at(at.offset)?;
+        about.add(&contents, its)?;
     }
     about.attachments = attachments;
     contents.read_header()?;
@@ -241,7 +243,7 @@ fn from_all(path: &Path) -> Result<Info, ReadError> {
                 tally.messages += 1;
                 tally.widen(Some((found.header.log_time, found.header.log_time)));
             }
-            Item::Metadata(metadata) => about.metadata.push(metadata),
+            Item::Metadata(metadata) => about.add(&contents, metadata)?,
             Item::Attachment(attachment) => about.attachments.push(attachment.index),
             Item::Damaged(at, damage) => damages.note(at, damage),
         }
@@ -251,13 +253,6 @@ fn from_all(path: &Path) -> Result<Info, ReadError> {
     info.chunks = contents.chunks();
     (info.damages, info.damage_count) = (damages.listed, damages.count);
     Ok(info)
-}
-
-/// What a file says besides its messages.
-#[derive(Default)]
-struct About {
-    metadata: Vec<Metadata>,
-    attachments: Vec<AttachmentIndex>,
 }
 
 fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> Result<Info, ReadError> {
@@ -289,7 +284,8 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
         described: Vec::new(),
         others: Vec::new(),
     };
-    let (mut lost, mut losses, mut memory) = (BTreeMap::new(), BTreeMap::new(), definitions.memory());
+    let About { lost, losses, .. } = about;
+    let mut memory = about.memory.and(definitions.memory()).map_err(|limit| contents.too_much(limit))?;
     for its in about.metadata {
         let is_heeded = contents.heeds(&its);
         let Metadata { name, metadata: mut texts } = its;
@@ -297,8 +293,6 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
             _ if !is_heeded => info.others.push((name.into(), foreign(texts))),
             metadata::SESSION if info.session.is_empty() => info.session = foreign(texts),
             metadata::CONFIGURATION => info.add_configuration(texts),
-            metadata::LOST => lost = format::counts(&texts),
-            metadata::LOST_BY => losses = Losses::of_texts(&texts),
             metadata::CLOSED => info.closed_because = texts.remove("reason").map(ForeignText::from),
             // Epochs are told by the channels.
             metadata::EPOCH => {}

@@ -59,6 +59,7 @@
 
 #![forbid(unsafe_code)]
 
+mod about;
 mod batch;
 mod control;
 mod current;

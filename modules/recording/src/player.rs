@@ -205,7 +205,7 @@ impl Player {
             match reader.seek(arrival_ns) {
                 Ok(true) => {
                     reader.read_ahead()?;
-                    self.find_older(arrival_ns)?;
+                    self.find_older(arrival_ns);
                     return Ok(true);
                 }
                 // A file that was not closed ends before.
@@ -223,14 +223,14 @@ impl Player {
     }
 
     /// Takes what the file repeats here, and looks for the rest in what came before, as far as its recording goes back.
-    fn find_older(&mut self, from_ns: u64) -> Result<(), ReadError> {
+    fn find_older(&mut self, from_ns: u64) {
         let present = |player: &mut Self| {
             let (_, message) = player.reader.as_mut().and_then(Reader::present)?;
             Some((message.epoch, message.arrival_ns))
         };
         let mut due_ns = present(self).map_or(from_ns, |(_, arrival_ns)| arrival_ns);
-        let mut bytes = self.take_repeated()?;
-        let start = PartStart { epoch: present(self).map_or(u64::MAX, |(epoch, _)| epoch), from_ns };
+        let mut bytes = self.take_repeated();
+        let start = PartStart { epoch: present(self).map(|(epoch, _)| epoch), from_ns };
         let mut topics: BTreeSet<ForeignText> = self.older.iter().map(|its| its.channel.topic.clone()).collect();
         for number in (self.began..=self.ended).rev() {
             let start = if number == self.ended { start } else { PartStart::END };
@@ -257,20 +257,19 @@ impl Player {
         self.older.iter_mut().for_each(|its| its.arrival_ns = due_ns);
         self.older.make_contiguous().sort_by_key(|its| (its.epoch, its.stamp_ns));
         self.is_file_new &= self.older.is_empty();
-        Ok(())
     }
 
-    /// Goes behind what the file repeats here; bytes of what is taken of that.
-    fn take_repeated(&mut self) -> Result<usize, ReadError> {
-        let Some(reader) = &mut self.reader else { return Ok(0) };
+    /// Goes behind what the file repeats here, or to what is wrong with it; bytes of what is taken of that.
+    fn take_repeated(&mut self) -> usize {
+        let Some(reader) = &mut self.reader else { return 0 };
         let mut bytes = 0;
         loop {
-            reader.advance()?;
-            let Some((channel, message)) = reader.present() else { return Ok(bytes) };
+            self.failed = reader.advance().err();
+            let Some((channel, message)) = reader.present() else { return bytes };
             let is_played = (self.plays)(&channel);
             if !channel.is_repeated() || bytes + message.data.len() > KEPT_BYTES_MAX {
                 self.is_ahead = is_played;
-                return Ok(bytes);
+                return bytes;
             }
             if is_played {
                 bytes += message.data.len();

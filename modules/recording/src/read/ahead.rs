@@ -6,7 +6,7 @@
 use crate::error::{Damage, ReadError};
 use crate::format::op;
 use crate::read::chunk;
-use crate::read::frames::{Frames, Step};
+use crate::read::frames::{Frames, HEAD_BYTES, Step};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -26,6 +26,9 @@ pub(crate) struct AheadRecord {
     pub(crate) begins: u64,
     /// Where the next one does.
     pub(crate) ends: u64,
+    /// From where on records are searched for if this is none, or behind this one: behind an index of messages that was
+    /// passed over, and of a chunk that was unpacked.
+    pub(crate) resume_at: Option<u64>,
     pub(crate) step: Result<Step, ReadError>,
     /// Its bytes; of a chunk that was unpacked, the records in it.
     pub(crate) body: Vec<u8>,
@@ -154,19 +157,25 @@ impl Passage {
 
 fn read_all(mut frames: Frames, passage: &Passage) {
     while let Some(mut body) = passage.room() {
-        let (mut begins, mut step) = (frames.at(), frames.step());
+        let (mut begins, mut step, mut resume_at) = (frames.at(), frames.step(), None);
         // They say where messages are in a chunk, and these are read in turn.
-        while matches!(step, Ok(Step::Record(op::MESSAGE_INDEX))) && !passage.is_over() {
+        while let Ok(Step::Record(op @ op::MESSAGE_INDEX)) = step
+            && chunk::is_exact(op, frames.body())
+            && !passage.is_over()
+        {
+            resume_at = Some(frames.at());
             (begins, step) = (frames.at(), frames.step());
         }
         let mut unpacked = None;
-        if matches!(step, Ok(Step::Record(op::CHUNK))) {
+        if let Ok(Step::Record(op @ op::CHUNK)) = step {
+            let is_exact = chunk::is_exact(op, frames.body());
+            resume_at = Some(if is_exact { frames.at() } else { begins + HEAD_BYTES as u64 });
             unpacked = Some(chunk::unpack(frames.body(), &mut body));
         } else {
             frames.swap_body(&mut body);
         }
         let goes_on = matches!(step, Ok(Step::Record(op)) if op != op::FOOTER);
-        passage.put(AheadRecord { begins, ends: frames.at(), step, body, unpacked });
+        passage.put(AheadRecord { begins, ends: frames.at(), resume_at, step, body, unpacked });
         if !goes_on {
             return;
         }

@@ -25,17 +25,20 @@ pub(crate) struct Attachment {
 }
 
 impl Attachment {
-    /// The one in the record there; or what is wrong with it.
-    pub(crate) fn at(frames: &mut Frames, begins: u64, ends: u64) -> Result<Result<Self, Damage>, ReadError> {
-        let mut head = Vec::new();
-        let body_at = begins + HEAD_BYTES as u64;
-        frames.bytes_at(body_at, &mut head, HEAD_BYTES_MAX)?;
-        let Some((index, data_at)) = fields(&head) else { return Ok(Err(Damage::Record { op: op::ATTACHMENT })) };
-        let sum_at = (body_at + data_at as u64).checked_add(index.data_size);
+    /// The one in the record there, which has this length; or what is wrong with it.
+    pub(crate) fn at(frames: &mut Frames, begins: u64, length: u64) -> Result<Result<Self, Damage>, ReadError> {
+        let damaged = Ok(Err(Damage::Record { op: op::ATTACHMENT }));
+        let ends = begins.checked_add(length).filter(|ends| *ends <= frames.len());
+        let (Some(ends), Some(body_bytes)) = (ends, length.checked_sub(HEAD_BYTES as u64)) else { return damaged };
+        let mut bytes = Vec::new();
+        frames.bytes_at(begins, &mut bytes, HEAD_BYTES + HEAD_BYTES_MAX)?;
+        let head = [&[op::ATTACHMENT][..], &body_bytes.to_le_bytes()].concat();
+        let Some((index, data_at)) = bytes.strip_prefix(&*head).and_then(fields) else { return damaged };
+        let sum_at = (begins + (HEAD_BYTES + data_at) as u64).checked_add(index.data_size);
         // Others may write more behind the sum.
         let is_whole = |at: &u64| at.checked_add(SUM_BYTES).is_some_and(|end| end <= ends);
-        let Some(sum_at) = sum_at.filter(is_whole) else { return Ok(Err(Damage::Record { op: op::ATTACHMENT })) };
-        let index = AttachmentIndex { offset: begins, length: ends - begins, ..index };
+        let Some(sum_at) = sum_at.filter(is_whole) else { return damaged };
+        let index = AttachmentIndex { offset: begins, length, ..index };
         Ok(Ok(Self { index, sum_at }))
     }
 

@@ -9,6 +9,7 @@ use crate::read::frames::Frames;
 use crate::read::index::{Index, last_before};
 use crate::shape::Shape;
 use mcap::records::MessageHeader;
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -16,22 +17,22 @@ use std::sync::Arc;
 /// Where reading begins. Epochs before time: behind a step of time back, what was before it has later times.
 #[derive(Clone, Copy)]
 pub(crate) struct PartStart {
-    /// Of the first message that is read.
-    pub(crate) epoch: u64,
+    /// Of the first message that is read. If there is none, no epoch is behind it.
+    pub(crate) epoch: Option<u64>,
     /// What arrived before this is not read.
     pub(crate) from_ns: u64,
 }
 
 impl PartStart {
     /// Behind the end of a file.
-    pub(crate) const END: Self = Self { epoch: u64::MAX, from_ns: u64::MAX };
+    pub(crate) const END: Self = Self { epoch: None, from_ns: u64::MAX };
 
     /// Messages of this epoch are before it, if they arrived before this time; none, if none are.
     fn before_ns(self, epoch: u64) -> Option<u64> {
-        match epoch.cmp(&self.epoch) {
-            std::cmp::Ordering::Less => Some(u64::MAX),
-            std::cmp::Ordering::Equal => Some(self.from_ns),
-            std::cmp::Ordering::Greater => None,
+        match self.epoch.map(|first| epoch.cmp(&first)) {
+            Some(Ordering::Less) => Some(u64::MAX),
+            Some(Ordering::Equal) | None => Some(self.from_ns),
+            Some(Ordering::Greater) => None,
         }
     }
 

@@ -1,7 +1,7 @@
 //! A chunk: unpacked and checked, or unpacked as far as it goes.
 
 use crate::error::{Damage, FileLimit};
-use crate::format::RECORD_BYTES_MAX;
+use crate::format::{RECORD_BYTES_MAX, op};
 use crate::read::frames::HEAD_BYTES;
 use std::io::Read;
 use std::ops::Range;
@@ -65,6 +65,16 @@ pub(crate) fn is_index(body: &[u8], len: u64) -> bool {
     list_bytes.is_some_and(|bytes| bytes % 16 == 0 && 6 + bytes == len)
 }
 
+/// Whether a record says twice how long it is, and the same: it ends where it says.
+pub(crate) fn is_exact(op: u8, body: &[u8]) -> bool {
+    let len = body.len() as u64;
+    match op {
+        op::CHUNK => extent(body) == Some(len),
+        op::MESSAGE_INDEX => is_index(body, len),
+        _ => false,
+    }
+}
+
 /// Unpacks a chunk's records, checked by their sum: all or nothing.
 pub(crate) fn unpack(body: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     records.clear();
@@ -87,6 +97,11 @@ fn unpack_checked(body: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
         return Err(Damage::ChunkSum);
     }
     Ok(())
+}
+
+/// Whether it is a chunk beyond doubt: unpacked, its records have the sum that stands in it.
+pub(crate) fn is_proven(body: &[u8], records: &mut Vec<u8>) -> bool {
+    split(body).is_some_and(|(header, _)| header.sum != 0) && unpack(body, records).is_ok()
 }
 
 /// Unpacks what there is of a chunk that the file's end cuts off. No sum says that it is right.

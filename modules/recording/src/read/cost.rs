@@ -3,6 +3,11 @@
 
 use crate::error::FileLimit;
 use crate::format::DESCRIBED_BYTES_MAX;
+use mcap::records::Metadata;
+
+/// What a text of metadata takes besides its bytes and those of its key: two vectors, in a map with room for twice as
+/// many.
+const TEXT_BYTES: usize = 4 * size_of::<String>();
 
 /// What was taken of [`DESCRIBED_BYTES_MAX`] so far.
 #[derive(Clone, Copy, Debug, Default)]
@@ -17,5 +22,17 @@ impl DescribedBytes {
         }
         self.0 = all;
         Ok(())
+    }
+
+    /// Metadata that are kept.
+    pub(crate) fn add_metadata(&mut self, its: &Metadata) -> Result<(), FileLimit> {
+        let texts = its.metadata.iter().map(|(key, text)| TEXT_BYTES + key.len() + text.len());
+        self.add(size_of::<Metadata>() + its.name.len() + texts.sum::<usize>(), 0)
+    }
+
+    /// Both.
+    pub(crate) fn and(mut self, other: Self) -> Result<Self, FileLimit> {
+        self.add(other.0, 0)?;
+        Ok(self)
     }
 }

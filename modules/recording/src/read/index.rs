@@ -12,7 +12,7 @@ const FOOTER_BYTES: usize = 8 + 8 + 4;
 /// What a closed file says about itself.
 pub(crate) struct Index {
     pub(crate) definitions: Definitions,
-    /// In the order of the file.
+    /// These are in the order of the file, each once.
     pub(crate) chunks: Vec<ChunkIndex>,
     pub(crate) metadata: Vec<MetadataIndex>,
     pub(crate) attachments: Vec<AttachmentIndex>,
@@ -20,15 +20,22 @@ pub(crate) struct Index {
     pub(crate) statistics: Option<Statistics>,
     /// Its sum says that it is right. Others may write none.
     pub(crate) is_checked: bool,
+    /// Where the file's last record begins.
+    footer_at: u64,
 }
 
 impl Index {
-    /// Whether each message is in a chunk that is listed here. Others may write no chunks, or list none.
+    /// Whether each message is in a chunk that is listed here, and these are apart. Others may write no chunks, or list
+    /// none.
     pub(crate) fn knows_all_chunks(&self) -> bool {
         let listed = self.chunks.len() as u64;
-        self.statistics
-            .as_ref()
-            .is_some_and(|its| listed == u64::from(its.chunk_count) && (listed > 0 || its.message_count == 0))
+        let behind = self.chunks.iter().skip(1).map(|chunk| chunk.chunk_start_offset).chain([self.footer_at]);
+        let ends = |chunk: &ChunkIndex| chunk.chunk_start_offset.saturating_add(chunk.chunk_length);
+        self.chunks.iter().zip(behind).all(|(chunk, behind)| ends(chunk) <= behind)
+            && self
+                .statistics
+                .as_ref()
+                .is_some_and(|its| listed == u64::from(its.chunk_count) && (listed > 0 || its.message_count == 0))
     }
 
     /// Whether each channel with messages is described here. Others may not describe them again.
@@ -95,10 +102,12 @@ impl Index {
             (Some(damage), _) => Err(damaged(frames, damage)),
             (None, false) => Err(damaged(frames, Damage::SummarySum)),
             (None, true) => {
-                read.chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
-                let Reading { definitions, chunks, metadata, attachments, statistics, .. } = read;
+                let Reading { definitions, mut chunks, mut metadata, mut attachments, statistics, .. } = read;
+                sort_places(&mut chunks, |its| its.chunk_start_offset);
+                sort_places(&mut metadata, |its| its.offset);
+                sort_places(&mut attachments, |its| its.offset);
                 let is_checked = footer.summary_crc != 0;
-                Ok(Self { definitions, chunks, metadata, attachments, statistics, is_checked })
+                Ok(Self { definitions, chunks, metadata, attachments, statistics, is_checked, footer_at })
             }
         }
     }
@@ -155,6 +164,13 @@ impl Reading {
         }
         Ok(())
     }
+}
+
+/// Puts parts in the order of the file. One that is listed twice is there once, and then they are not as many as the
+/// file says it has.
+fn sort_places<T>(listed: &mut Vec<T>, place: impl Fn(&T) -> u64) {
+    listed.sort_by_key(&place);
+    listed.dedup_by_key(|its| place(its));
 }
 
 /// When the first and the last of a channel's messages in a chunk came.

@@ -167,6 +167,11 @@ struct HeldStretch {
     found: VecDeque<Found>,
 }
 
+/// What so many messages with these data take; they need not have any.
+fn memory(data: &[u8], messages: usize) -> usize {
+    data.len() + messages * size_of::<Found>()
+}
+
 impl HeldStretch {
     fn memory(&self) -> usize {
         self.data.capacity() + self.found.capacity() * size_of::<Found>()
@@ -194,7 +199,7 @@ impl Ordered {
     /// The next messages; none at the end. What is wrong with the file is told behind its last message.
     fn batch(&mut self) -> Result<OrderedBatch, ReadError> {
         let mut batch = OrderedBatch::default();
-        while batch.data.len() < BATCH_BYTES {
+        while memory(&batch.data, batch.found.len()) < BATCH_BYTES {
             if let Some(next) = self.next.filter(|its| self.earliest_ns().is_none_or(|ns| its.first_ns <= ns)) {
                 self.hold(next)?;
                 self.next = self.stretches.next();
@@ -233,7 +238,7 @@ impl Ordered {
             match item {
                 Item::Message(its) if its.header.log_time >= self.from_ns => {
                     let bytes = self.contents.data(&its);
-                    if self.held_bytes + data.len() + bytes.len() > self.held_bytes_max {
+                    if self.held_bytes + memory(&data, found.len() + 1) + bytes.len() > self.held_bytes_max {
                         return Err(self.contents.too_much(FileLimit::Disorder));
                     }
                     found.push(its.copied(bytes, &mut data));
@@ -265,13 +270,17 @@ mod tests {
 
     /// A file with these chunks, each with messages of these times.
     fn file(chunks: &[&[u64]]) -> tempfile::NamedTempFile {
+        file_of(chunks, &[7; BYTES])
+    }
+
+    fn file_of(chunks: &[&[u64]], data: &[u8]) -> tempfile::NamedTempFile {
         let file = tempfile::NamedTempFile::new().unwrap();
         let mut writer = WriteOptions::new().chunk_size(None).compression(None).create(file.reopen().unwrap()).unwrap();
         let channel_id = writer.add_channel(0, "/a", "raw", &BTreeMap::new()).unwrap();
         for times in chunks {
             for log_time in *times {
                 let header = MessageHeader { channel_id, sequence: 0, log_time: *log_time, publish_time: 0 };
-                writer.write_to_known_channel(&header, &[7; BYTES]).unwrap();
+                writer.write_to_known_channel(&header, data).unwrap();
             }
             writer.flush().unwrap();
         }
@@ -307,6 +316,23 @@ mod tests {
             let error = times(&plan, file.path()).1.unwrap();
             assert!(matches!(error, ReadError::TooMuch { limit: FileLimit::Disorder, .. }), "{chunks:?}: {error}");
         }
+    }
+
+    #[test]
+    fn messages_without_data_take_room_as_well() {
+        const MESSAGES: usize = 3 * BATCH_BYTES / size_of::<Found>();
+        let file = file_of(&[&[1; MESSAGES]], &[]);
+        let mut plan = TimePlan::of(file.path()).unwrap();
+        let batches: Vec<usize> =
+            plan.read(file.path(), 0).unwrap().into_iter().map(|told| told.unwrap().found.len()).collect();
+        assert_eq!(batches.iter().sum::<usize>(), MESSAGES);
+        assert!(
+            batches.iter().all(|count| count * size_of::<Found>() < BATCH_BYTES + size_of::<Found>()),
+            "{batches:?}"
+        );
+        plan.held_bytes_max = BATCH_BYTES;
+        let error = times(&plan, file.path()).1;
+        assert!(matches!(error, Some(ReadError::TooMuch { limit: FileLimit::Disorder, .. })), "{error:?}");
     }
 
     #[test]

@@ -29,7 +29,7 @@ impl Outline {
         }
         let mut attachments = Vec::new();
         for its in &index.attachments {
-            let told = Attachment::at(frames, its.offset, its.offset.saturating_add(its.length))?;
+            let told = Attachment::at(frames, its.offset, its.length)?;
             let damaged = |what| ReadError::Damaged { path: Shown(frames.path().to_owned()), at: its.offset, what };
             attachments.push(told.map_err(damaged)?);
         }

@@ -1,17 +1,21 @@
 //! Small files that ask for much: what is kept of them is bounded, and limits are told as limits.
 
 use super::support::memory_folder;
-use crate::format::SCHEMA_ENCODING;
+use crate::format::{DESCRIBED_BYTES_MAX, SCHEMA_ENCODING};
 use crate::{FileLimit, ReadError, Reader, RecoverError, info, recover};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::Arc;
 
 const OP_CHUNK: u8 = 6;
 const OP_MESSAGE: u8 = 5;
+const OP_MESSAGE_INDEX: u8 = 7;
+const OP_SCHEMA: u8 = 3;
+const OP_METADATA: u8 = 12;
 
 /// A compressed file of channels of one type, with these texts and a message each.
 fn write(path: &Path, channels: u16, ty: &Type, texts: &BTreeMap<String, String>) {
@@ -50,7 +54,7 @@ fn descriptions_beyond_the_limit_are_refused_as_such() {
     assert!(std::fs::metadata(&path).unwrap().len() < 1 << 20, "what is compressed says nothing of what it takes");
     let check = |error: &ReadError| {
         assert!(matches!(error, ReadError::TooMuch { limit: FileLimit::Described, .. }), "{error}");
-        let says = "what it describes (types, channels, modules) takes more than 256 MiB of memory, which is the limit";
+        let says = "what it describes (types, channels, modules, metadata) takes more than 256 MiB of memory";
         assert!(error.to_string().contains(says), "{error}");
     };
     check(&info(&path).unwrap_err());
@@ -60,6 +64,27 @@ fn descriptions_beyond_the_limit_are_refused_as_such() {
         Err(RecoverError::Read(error)) => check(&error),
         other => panic!("{other:?}"),
     }
+}
+
+/// The file is sparse: its texts are of zeroes, and take no room.
+#[test]
+fn metadata_beyond_the_limit_are_refused_as_such() {
+    const TEXT_BYTES: usize = 16 << 20;
+    let folder = memory_folder();
+    let path = folder.path().join("long.mcap");
+    let file = std::fs::File::create(&path).unwrap();
+    file.write_all_at(mcap::MAGIC, 0).unwrap();
+    let mut at = mcap::MAGIC.len() as u64;
+    for _ in 0..DESCRIBED_BYTES_MAX / TEXT_BYTES {
+        // No name; length of the list; no key; length of its text.
+        let fields = [0, 8 + TEXT_BYTES as u32, 0, TEXT_BYTES as u32].map(u32::to_le_bytes).concat();
+        let len = (fields.len() + TEXT_BYTES) as u64;
+        file.write_all_at(&[&[OP_METADATA][..], &len.to_le_bytes(), &fields].concat(), at).unwrap();
+        at += 9 + len;
+        file.set_len(at).unwrap();
+    }
+    let error = info(&path).err().unwrap();
+    assert!(matches!(error, ReadError::TooMuch { limit: FileLimit::Described, .. }), "{error}");
 }
 
 /// A record of these bytes.
@@ -112,4 +137,21 @@ fn nested_records_are_not_read_as_often_as_there_are_bytes() {
     std::fs::write(&path, bytes).unwrap();
     let told = recover(&path, &folder.path().join("new.mcap"), &mut |_, _| {}).unwrap();
     assert!(told.messages == 0 && told.damage_count > 2 && told.damage_count < 200, "{told:?}");
+}
+
+/// Each of these claims to be longer than the file, which would be read to its end for each of them.
+#[test]
+fn records_that_claim_much_do_not_have_the_file_read_as_often() {
+    const TIMES: usize = 10_000;
+    const CLAIMED: u64 = 100 << 20;
+    let folder = memory_folder();
+    // Of no bytes: its body is forty zeroes.
+    let chunk = [&[OP_CHUNK][..], &CLAIMED.to_le_bytes(), &[0; 40]].concat();
+    let index = [&record(OP_MESSAGE_INDEX, &[0; 6])[..], &[OP_SCHEMA], &CLAIMED.to_le_bytes()].concat();
+    for (case, bytes) in [("chunks", chunk), ("schemas", index)] {
+        let [path, to] = ["mcap", "new"].map(|kind| folder.path().join(case).with_extension(kind));
+        std::fs::write(&path, [mcap::MAGIC, &bytes.repeat(TIMES)].concat()).unwrap();
+        let told = recover(&path, &to, &mut |_, _| {}).unwrap();
+        assert!(told.messages == 0 && told.damage_count > 2 && told.damage_count < 200, "{case}: {told:?}");
+    }
 }

@@ -2,8 +2,8 @@
 
 use super::support::{Said, file_of, memory_folder, options, read, said, session};
 use crate::{
-    ChannelSpec, CutError, LastMessage, Mark, Message, ReadError, RecoverError, RewriteError, SelectError, Selection,
-    Writer, cut, info, last_message, merge, recover, recovered_path,
+    ChannelSpec, CutError, LastMessage, Mark, Message, ReadError, Reader, RecoverError, RewriteError, SelectError,
+    Selection, Writer, cut, info, last_message, merge, recover, recovered_path,
 };
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
@@ -187,6 +187,27 @@ fn a_part_is_taken_by_time_and_name() {
         assert_eq!(told.others[0].0, "rohrpost.cut");
         assert_eq!(told.session["node"], "base", "{why}");
         std::fs::remove_file(&to).unwrap();
+    }
+}
+
+/// Whichever epochs its messages are of.
+#[test]
+fn a_part_in_which_nothing_came_begins_with_what_came_before_it() {
+    let folder = memory_folder();
+    for epochs in [[1, 1, 1], [1, 1, 2], [1, 2, 2]] {
+        let mut all = said(3, 10);
+        for (said, (arrival_ns, epoch)) in all.iter_mut().zip([1_000, 25_000, 26_000].into_iter().zip(epochs)) {
+            *said = Said { topic: "laser.0/scan".into(), arrival_ns, stamp_ns: arrival_ns, epoch, ..said.clone() };
+        }
+        let path = file_of(folder.path(), &format!("{epochs:?}"), &all);
+        let to = path.with_extension("part");
+        let selection = Selection { from_ns: Some(10_000), until_ns: Some(20_000), ..Selection::default() };
+        assert_eq!(cut(&path, &to, &selection, &mut |_, _| {}).unwrap().0, 0);
+        let (mut reader, mut stamps) = (Reader::open(&to).unwrap(), Vec::new());
+        while let Some((channel, message)) = reader.next().unwrap() {
+            stamps.push((channel.is_repeated(), message.stamp_ns));
+        }
+        assert_eq!(stamps, [(true, 1_000)], "{epochs:?}");
     }
 }
 

@@ -1,6 +1,8 @@
 //! Damaged files are read as far as they are right; no input panics, and none takes much memory.
 
 use super::support::{Said, file_of, memory_folder, read, said};
+use crate::format::op;
+use crate::read::contents::{Contents, Item};
 use crate::{Selection, cut, info, merge, recover};
 use proptest::prelude::*;
 use std::path::Path;
@@ -94,6 +96,45 @@ proptest! {
         bytes.extend(mcap::MAGIC);
         let folder = memory_folder();
         try_all(folder.path(), &bytes);
+    }
+}
+
+/// Also where a chunk has data that look like records, and what is behind it is damaged.
+#[test]
+fn a_thread_that_reads_ahead_reads_the_same() {
+    let record = |op: u8, body: &[u8]| [&[op][..], &(body.len() as u64).to_le_bytes(), body].concat();
+    let chunk = |records: &[u8]| {
+        let len = (records.len() as u64).to_le_bytes();
+        let sum = crc32fast::hash(records).to_le_bytes();
+        record(op::CHUNK, &[&[0; 16][..], &len, &sum, &[0; 4], &len, records].concat())
+    };
+    let message = |sequence: u32, data: &[u8]| {
+        record(op::MESSAGE, &[&[0; 2][..], &sequence.to_le_bytes(), &[0; 16], data].concat())
+    };
+    let channel = record(op::CHANNEL, &[&[0; 4][..], &1_u32.to_le_bytes(), b"a", &[0; 8]].concat());
+    let index = record(op::MESSAGE_INDEX, &[0; 6]);
+    let nested = chunk(&message(99, &[]));
+    let first = chunk(&[channel, message(1, &nested)].concat());
+    let folder = memory_folder();
+    let path = folder.path().join("nested.mcap");
+    for between in [&[][..], &index] {
+        let bytes = [mcap::MAGIC, &first, between, &[0; 20], &chunk(&message(2, &[]))].concat();
+        std::fs::write(&path, bytes).unwrap();
+        for is_ahead in [false, true] {
+            let mut contents = Contents::open(&path).unwrap();
+            if is_ahead {
+                contents.read_ahead().unwrap();
+            }
+            let (mut numbers, mut damages) = (Vec::new(), 0);
+            while let Some(item) = contents.next().unwrap() {
+                match item {
+                    Item::Message(found) => numbers.push(found.header.sequence),
+                    Item::Damaged(..) => damages += 1,
+                    Item::Metadata(_) | Item::Attachment(_) => {}
+                }
+            }
+            assert_eq!((numbers, damages), (vec![1, 2], 1), "{} bytes between, {is_ahead}", between.len());
+        }
     }
 }
 

@@ -4,6 +4,8 @@ use super::support::memory_folder;
 use crate::format::{key, metadata, op};
 use crate::read::chunk;
 use crate::read::contents::Contents;
+use crate::read::frames::Frames;
+use crate::read::index::Index;
 use crate::{Damage, Info, Reader, Selection, cut, info, merge, recover};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions};
@@ -213,6 +215,30 @@ fn chunks_packed_by_lz4_are_read_and_others_are_named() {
     }
     let told = chunk::unpack(&chunk_of(&records, len, "bz2", &packed), &mut found);
     assert_eq!(told, Err(Damage::ForeignCompression("bz2".into())));
+}
+
+/// Of forty zeroes a chunk of no bytes may be made, with the length that it has.
+#[test]
+fn a_message_that_could_be_a_chunk_is_one_of_its_type() {
+    let folder = memory_folder();
+    let path = folder.path().join("0.mcap");
+    let mut writer = WriteOptions::new().use_chunks(false).create(std::fs::File::create(&path).unwrap()).unwrap();
+    let channel_id = writer.add_channel(0, "/a", "raw", &BTreeMap::new()).unwrap();
+    for sequence in 0..5 {
+        let header = MessageHeader { channel_id, sequence, log_time: 5, publish_time: 5 };
+        writer.write_to_known_channel(&header, &[0; 18]).unwrap();
+    }
+    writer.finish().unwrap();
+    let told = recover(&path, &path.with_extension("new"), &mut |_, _| {}).unwrap();
+    assert_eq!((told.messages, told.damages), (5, vec![]));
+    // A chunk with a wrong type stays one.
+    write(&path, WriteOptions::new().chunk_size(Some(500)));
+    let mut bytes = std::fs::read(&path).unwrap();
+    let at = Index::read(&mut Frames::open(&path).unwrap()).unwrap().chunks[0].chunk_start_offset;
+    assert_eq!(std::mem::replace(&mut bytes[at as usize], op::MESSAGE), op::CHUNK);
+    std::fs::write(&path, bytes).unwrap();
+    let told = recover(&path, &path.with_extension("other"), &mut |_, _| {}).unwrap();
+    assert!(matches!(told.damages[..], [(its, Damage::NoRecord { op: op::MESSAGE, .. })] if its == at), "{told:?}");
 }
 
 /// The index says that the last message came before the first. The messages themselves say when they came.

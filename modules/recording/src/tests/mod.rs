@@ -12,6 +12,7 @@ mod features;
 mod flipped;
 mod foreign;
 mod large;
+mod listed;
 mod merging;
 mod moved;
 mod ordered;

@@ -4,6 +4,8 @@ use super::beginning::three_files;
 use super::foreign;
 use super::support::{Said, file_of, memory_folder, noise, options, read, record, said};
 use crate::disk::RealDisk;
+use crate::read::frames::Frames;
+use crate::read::index::Index;
 use crate::{Cue, Damage, Options, Player, ReadError, Rotation, Selection, cut, merge};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
@@ -228,4 +230,33 @@ fn in_files_of_others_the_newest_is_the_newest_by_time() {
         writer.finish().unwrap();
         assert_eq!(played(&[path], 3_500).older, [("/imu".to_owned(), 3_000)], "{has_index}");
     }
+}
+
+/// What it repeats is taken, what is damaged is told, and the rest is played.
+#[test]
+fn damage_behind_what_a_file_repeats_is_passed_over() {
+    let folder = memory_folder();
+    let path = folder.path().join("0.mcap");
+    let mut writer = WriteOptions::new()
+        .profile(crate::format::PROFILE)
+        .compression(None)
+        .create(std::fs::File::create(&path).unwrap())
+        .unwrap();
+    let texts = BTreeMap::from([(crate::format::key::REPEATED.to_owned(), "true".to_owned())]);
+    let repeated = writer.add_channel(0, "/a", "raw", &texts).unwrap();
+    let own = writer.add_channel(0, "/b", "raw", &BTreeMap::new()).unwrap();
+    for (sequence, (channel_id, log_time)) in (0..).zip([(repeated, 10), (own, 10), (own, 20)]) {
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        writer.write_to_known_channel(&header, &[7; 100]).unwrap();
+        writer.flush().unwrap();
+    }
+    writer.finish().unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let chunks = Index::read(&mut Frames::open(&path).unwrap()).unwrap().chunks;
+    let ends = chunks[1].chunk_start_offset + chunks[1].chunk_length;
+    bytes[ends as usize - 50] ^= 1;
+    std::fs::write(&path, bytes).unwrap();
+    let Played { older, rest, errors, .. } = played(&[path], 5);
+    assert_eq!((older, rest), (vec![("/a".to_owned(), 0)], vec![("/b".to_owned(), 2)]));
+    assert!(matches!(errors[..], [ReadError::Damaged { what: Damage::ChunkSum, .. }]), "{errors:?}");
 }

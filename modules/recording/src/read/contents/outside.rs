@@ -22,16 +22,11 @@ impl Contents {
         let begins = self.begins;
         let behind_head = begins + HEAD_BYTES as u64;
         if let Some(unpacked) = unpacked {
-            self.resume_at = behind_head;
             return Ok(self.enter_chunk(unpacked).err().map(|damage| Item::Damaged(begins, damage)));
         }
         match step {
             Step::Record(op) => {
-                let is_exact = match op {
-                    op::CHUNK => chunk::extent(self.frames.body()) == Some(self.frames.body().len() as u64),
-                    op::MESSAGE_INDEX => chunk::is_index(self.frames.body(), self.frames.body().len() as u64),
-                    _ => false,
-                };
+                let is_exact = chunk::is_exact(op, self.frames.body());
                 self.resume_at = if is_exact { self.frames.at() } else { behind_head };
                 self.record(op)
             }
@@ -61,6 +56,10 @@ impl Contents {
         };
         let unpacked = chunk::unpack(body, &mut self.records);
         self.resume_at = begins + HEAD_BYTES as u64;
+        if self.reads_again(self.resume_at + extent) {
+            self.ending = Some(Ending::Damaged);
+            return Ok(Some(Item::Damaged(begins, Damage::Cut)));
+        }
         self.frames.seek(self.resume_at + extent)?;
         let damage = self.enter_chunk(unpacked).err();
         Ok(Some(Item::Damaged(begins, damage.unwrap_or(Damage::Record { op: op::CHUNK }))))
@@ -71,8 +70,7 @@ impl Contents {
         let (begins, resume_at) = (self.begins, self.resume_at);
         let damaged = |damage| Some(Item::Damaged(begins, damage));
         self.ahead = None;
-        self.reread = self.reread.saturating_add(begins.saturating_sub(resume_at));
-        if self.reread > REREAD_BYTES_MAX.saturating_add(self.frames.len().saturating_mul(2)) {
+        if self.reads_again(resume_at) {
             self.ending = Some(Ending::Damaged);
             return Ok(damage.and_then(damaged));
         }
@@ -90,18 +88,25 @@ impl Contents {
         }
     }
 
+    /// Reading goes back from where it is to there. Whether that is too often.
+    fn reads_again(&mut self, from: u64) -> bool {
+        self.reread = self.reread.saturating_add(self.frames.at().saturating_sub(from));
+        self.reread > REREAD_BYTES_MAX.saturating_add(self.frames.len().saturating_mul(2))
+    }
+
     /// What is next in the file, and whether it is a chunk that was unpacked or could not be.
     fn step(&mut self) -> Result<(Step, Option<Result<(), Damage>>), ReadError> {
         let Some(ahead) = &mut self.ahead else {
             self.begins = self.frames.at();
             return Ok((self.frames.step()?, None));
         };
-        let Some(AheadRecord { begins, ends, step, mut body, unpacked }) = ahead.next() else {
+        let Some(AheadRecord { begins, ends, resume_at, step, mut body, unpacked }) = ahead.next() else {
             self.ahead = None;
             self.frames.seek(self.frames.at())?;
             return self.step();
         };
         self.begins = begins;
+        self.resume_at = resume_at.unwrap_or(self.resume_at);
         self.frames.pass_to(ends);
         match unpacked {
             Some(_) => std::mem::swap(&mut self.records, &mut body),
@@ -115,8 +120,13 @@ impl Contents {
         let (begins, body) = (self.begins, self.frames.body());
         let len = body.len() as u64;
         // By one bit the type of a chunk, or of an index of messages, becomes another.
-        let is_other = (op != op::CHUNK && chunk::extent(body) == Some(len))
-            || (op == op::MESSAGE && self.chunks > 0 && chunk::is_index(body, len));
+        let is_other = match op {
+            op::CHUNK => false,
+            // Its data may be anything, and have a chunk's length where a chunk has that.
+            op::MESSAGE if chunk::extent(body) == Some(len) => chunk::is_proven(body, &mut self.records),
+            op::MESSAGE => self.chunks > 0 && chunk::is_index(body, len),
+            _ => chunk::extent(body) == Some(len),
+        };
         if is_other {
             return Ok(Some(Item::Damaged(begins, Damage::NoRecord { op, len })));
         }
@@ -143,7 +153,7 @@ impl Contents {
             },
             op::ATTACHMENT => {
                 let ends = self.frames.at();
-                let told = Attachment::at(&mut self.frames, begins, ends)?;
+                let told = Attachment::at(&mut self.frames, begins, ends - begins)?;
                 self.frames.seek(ends)?;
                 self.resume_at = if told.is_ok() { ends } else { self.resume_at };
                 told.map(|attachment| Some(Item::Attachment(attachment)))
