@@ -144,7 +144,7 @@ fn routers_agree_on_what_is_on_the_wire() {
         ("security = \"none\"", "security = \"none\"\n#", true, "a remark"),
         ("mtu = 9000", "mtu = 1500", false, "another MTU"),
         ("[\"desk\", \"base\"]", "[\"base\", \"desk\"]", false, "another first master"),
-        ("\"500 ms\"\n\n[output]", "\"1 s\"\n\n[output]", false, "another interval"),
+        ("interval = \"500 ms\"", "interval = \"1 s\"", false, "another interval"),
         ("id = 150", "id = 151", false, "other names"),
         ("10.0.0.2", "10.0.0.3", false, "another address"),
     ] {

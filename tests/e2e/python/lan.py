@@ -104,7 +104,7 @@ class Node:
     def datagram(self, kind, to, sequence, rest, key, nonce):
         head = struct.pack(
             "<2sBBBBBBQQQ",
-            b"Rp", 1, kind, self.system, self.own, to, self.key_id, self.digest, self.incarnation, sequence,
+            b"Rp", 2, kind, self.system, self.own, to, self.key_id, self.digest, self.incarnation, sequence,
         )  # fmt: skip
         sealed = cipher(key, nonce, rest)
         sealed += tag(key, nonce, head, sealed)

@@ -20,7 +20,7 @@ from wire import name, package
 def junk(node, to):
     """Datagrams that nobody sealed, at both ports."""
     head = struct.pack(
-        "<2sBBBBBBQQQ", b"Rp", 1, 1, 1, node.own, to, 0, node.digest, node.incarnation + 2, 2**48 - 1
+        "<2sBBBBBBQQQ", b"Rp", 2, 1, 1, node.own, to, 0, node.digest, node.incarnation + 2, 2**48 - 1
     )  # fmt: skip
     body = package(name("1.140.0.2"), name("1.150.0.0"), -16385, 0, os.urandom(64), 255)
     check = struct.pack("<I", zlib.crc32(head + body))
