@@ -168,7 +168,7 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::RepeatsForEver, Promise::RecordBounds, Network::Replicated, 1),
     caught(Mistake::PartsUnpaced, Promise::RecordBounds, Network::Replicated, 1),
     caught(Mistake::OverrunsWithPart, Promise::InWindow, Network::SlottedReplicated, 1),
-    caught(Mistake::DescribesOnce, Promise::Recovery, Network::Replicated, 34),
+    caught(Mistake::DescribesOnce, Promise::Recovery, Network::Replicated, 58),
 ];
 
 /// Mistakes that break no promise here, and why. The routers' own tests show each.
