@@ -147,6 +147,8 @@ class Looker(rp.Module, klass="looker"):
         told["mine"] = mine[0, :3].tolist()
         with depths.newest() as record:
             told["metres"] = round(float(numpy.frombuffer(record.value.pixels, numpy.float32).mean()), 3)
+        with pairs.newest():
+            pass  # A stream that was not there yet is opened by its first reading.
         told["calls"] = self.calls(images) + self.calls(pairs)
         seen: set[int] = set()
         while len(seen) < len(ALL_KINDS):
