@@ -38,7 +38,7 @@ pub(super) struct Arguments {
 const NEW_EPOCH: u16 = 16;
 /// A new epoch begins within this time.
 const BEGINS_WITHIN: Duration = Duration::from_secs(5);
-/// It is looked so often whether it has.
+/// How often it is asked whether the new epoch has begun.
 const BEGINS_LOOK: Duration = Duration::from_millis(100);
 
 /// A node's report of its time.

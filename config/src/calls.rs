@@ -7,7 +7,7 @@ use rohrpost_mailbox::Name;
 /// Why a module names a less important one in its `calls`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Downwards {
-    /// It subscribes to data of it, and calls nothing: that waits for nobody.
+    /// Only subscribes to the other's data, and calls nothing: that waits for nobody.
     Subscribes,
     /// The file's reason.
     Although(String),

@@ -121,7 +121,7 @@ pub enum ControlError {
     /// It is to be stopped, and was left out.
     #[error("{0} is left out and never ran, since its program is missing; `rohrpost start {0}` looks for it again")]
     LeftOut(String),
-    /// It is to be started, and its program is missing. One that runs goes on.
+    /// The module is to be started, and its program is missing. One that runs goes on.
     #[error("{module} is not started: for launch `{program}` {place}; build or install it, then say it again")]
     NoProgram {
         /// The module.

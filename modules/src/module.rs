@@ -194,7 +194,7 @@ impl ModuleError {
         Self { text: format!("{place}: {}", error.text), ..error }
     }
 
-    /// The same with the number of the kernel's error that is behind it, where a language other than Rust tells it.
+    /// This error with the number of the kernel's error that is behind it, where a language other than Rust tells it.
     ///
     /// ```
     /// use rohrpost_modules::ModuleError;

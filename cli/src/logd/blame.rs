@@ -10,7 +10,7 @@ use rohrpost_recording::{LossCause, Pace};
 pub(super) enum Omitted {
     /// In a ring of this node.
     Record,
-    /// The same, written since an earlier process of the recorder ended.
+    /// A record, written since an earlier process of the recorder ended.
     EarlierRecord,
     /// From a publisher on this node.
     NearPackage,

@@ -28,9 +28,9 @@ pub(super) struct Tap {
     pub(super) texts: BTreeMap<String, String>,
     pub(super) sampling: Sampling,
     pub(super) sampler: Sampler,
-    /// Its publisher is on this node.
+    /// The publisher is on this node.
     pub(super) is_near: bool,
-    /// It goes on behind an earlier process: what is missing before the first record went while there was none.
+    /// The tap goes on behind an earlier process: what is missing before the first record went while there was none.
     pub(super) is_resumed: bool,
     /// Lines of output: from this level on.
     pub(super) least: Option<OutputLevel>,

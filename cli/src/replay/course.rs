@@ -27,7 +27,7 @@ pub(super) enum Move<'a> {
     Wait { until_ns: u64 },
     /// Ask again at once.
     Again,
-    /// It begins anew: what comes next is of another round.
+    /// The course begins anew: what comes next is of another round.
     Round,
     /// It is at its end just now.
     End,
@@ -63,7 +63,7 @@ pub(super) struct Course {
     step: Option<CourseStep>,
     /// Time has begun since the last seek.
     has_begun: bool,
-    /// It was told something, so those that are to hear what is played listen. Before that nothing is played.
+    /// The course was told something, so those that are to hear what is played listen. Before that nothing is played.
     is_told: bool,
     /// There is no further value in this round.
     is_over: bool,

@@ -22,7 +22,7 @@ pub(super) const ROUND_MIN: Duration = Duration::from_millis(100);
 pub(super) struct PlayerSettings {
     /// The recording, in order.
     pub(super) files: Vec<RecordingPath>,
-    /// Its begin and its end, ns since 1970.
+    /// When the recording begins and ends, ns since 1970.
     pub(super) begin_ns: u64,
     pub(super) end_ns: u64,
     /// Names that it stands in for, and files with their descriptions.

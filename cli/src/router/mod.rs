@@ -1,6 +1,7 @@
 //! `rohrpost router`: carries packages between this node and the others of its system. Launch starts one on each node.
 
 mod clock;
+mod clock_watch;
 pub(super) mod faults;
 mod flows;
 pub(crate) mod keys;
@@ -9,10 +10,11 @@ pub(crate) mod replicas;
 mod slots;
 
 use crate::terminal::Failure;
+use clock_watch::{ClockReading, ClockWatch};
 use rohrpost::interfaces::{ClockRole, NewEpochError, Router, RouterInterface};
 use rohrpost::{Context, Module, ModuleError, Start};
 use rohrpost_config::ClockSetPolicy;
-use rohrpost_mailbox::{CLOCK_SET_NS, Latency, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::Latency;
 use rohrpost_modules::launch::clock_was_set;
 use rohrpost_modules::runtime::{exit, kept, run_started};
 use rohrpost_routers::impair;
@@ -25,12 +27,10 @@ use serde::Deserialize;
 use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How often it publishes its state.
 const PERIOD: Duration = Duration::from_millis(500);
-/// Between epochs that somebody asks for: after each one all nodes measure their clocks anew.
-const EPOCH_PAUSE: Duration = Duration::from_secs(10);
 
 #[derive(clap::Args)]
 #[command(after_help = "Example, on the first node of robot.toml: rohrpost router --config robot.toml --name router.0
@@ -58,29 +58,15 @@ struct RouterModule {
     replicas: Vec<ReplicaSettings>,
     /// Delays of those that come, as they were reported last.
     delays: Vec<Latency>,
-    /// How far this computer's clock was ahead of the monotonic one when the router, or the last epoch, began.
-    clock_ahead_ns: i128,
-    /// When it asked for an epoch last.
-    epoch_asked: Option<Instant>,
-}
-
-/// How far this computer's clock is ahead of the monotonic one.
-fn clock_ahead_ns() -> i128 {
-    i128::from(realtime_ns()) - i128::from(monotonic_ns())
+    clock_watch: ClockWatch,
 }
 
 impl RouterModule {
-    /// Whether this computer's clock was set meanwhile. One that was wrong from the beginning, as that of a node that
-    /// takes over, is only told.
-    fn was_set(&self) -> bool {
-        (clock_ahead_ns() - self.clock_ahead_ns).unsigned_abs() >= u128::from(CLOCK_SET_NS)
-    }
-
     /// Has the clock's thread begin an epoch. False: that is asked already.
     fn ask_new_epoch(&mut self) -> bool {
         let is_asked = self.shell.clock().is_some_and(|clock| clock.ask_new_epoch());
         if is_asked {
-            (self.clock_ahead_ns, self.epoch_asked) = (clock_ahead_ns(), Some(Instant::now()));
+            self.clock_watch.asked(ClockReading::now());
         }
         is_asked
     }
@@ -93,7 +79,7 @@ impl Router for RouterModule {
         if seen.role != Role::Master {
             return Err(NewEpochError::NotMaster);
         }
-        if self.epoch_asked.is_some_and(|asked| asked.elapsed() < EPOCH_PAUSE) {
+        if self.clock_watch.is_too_soon(ClockReading::now()) {
             return Err(NewEpochError::TooSoon);
         }
         self.ask_new_epoch();
@@ -140,7 +126,7 @@ impl Module for RouterModule {
         }
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { shell, replicas, delays: Vec::new(), clock_ahead_ns: clock_ahead_ns(), epoch_asked: None })
+        Ok(Self { shell, replicas, delays: Vec::new(), clock_watch: ClockWatch::new(ClockReading::now()) })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -154,7 +140,7 @@ impl Module for RouterModule {
             if let Some(by_ns) = state.clock_set_by_ns
                 && follows
                 && state.role == ClockRole::Master
-                && self.was_set()
+                && self.clock_watch.was_set(ClockReading::now())
                 && self.ask_new_epoch()
             {
                 tracing::warn!("{}: a new epoch of time begins at it", clock_was_set(by_ns));

@@ -78,7 +78,7 @@ pub mod key {
     /// Of a channel with what came last before the file, from an earlier one, as a beginning: `true`. The log time of
     /// its messages is that of the file's first message, the publish time is the stamp.
     pub const REPEATED: &str = "repeated";
-    /// The same as [`REPEATED`] in a file of another program, where that key means something else.
+    /// What [`REPEATED`] says, in a file of another program, where that key means something else.
     pub(crate) const REPEATED_OF_OTHERS: &str = "rohrpost.repeated";
     /// Of a channel that was drawn of another one, for other programs: the topic of that.
     pub const DRAWN: &str = "drawn";

@@ -26,7 +26,7 @@ pub type ForeignTexts = BTreeMap<ForeignText, ForeignText>;
 pub struct Info {
     /// The file.
     pub path: PathBuf,
-    /// Its length.
+    /// Length of the file.
     pub bytes: u64,
     /// It has its index and its end.
     pub is_closed: bool,
@@ -79,11 +79,11 @@ pub struct Info {
 /// A file in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AttachmentInfo {
-    /// Its name.
+    /// Name of the attachment.
     pub name: ForeignText,
-    /// Its kind, as mail has it: `text/plain`.
+    /// Media type of the attachment: `text/plain`.
     pub media_type: ForeignText,
-    /// Its length.
+    /// Length of the attachment, bytes.
     pub bytes: u64,
 }
 

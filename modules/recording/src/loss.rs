@@ -11,7 +11,7 @@ const BETWEEN: char = ' ';
 /// Why a message that should be recorded is in no file. What is left out by sampling is not lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LossCause {
-    /// It was lost between two nodes.
+    /// Lost between two nodes.
     Way,
     /// No recorder ran.
     Away,
@@ -21,7 +21,7 @@ pub enum LossCause {
     Processor,
     /// The disk was slower than messages came, or failed.
     Disk,
-    /// It is longer than a message, or the recorder's mailbox, can be.
+    /// Longer than a message, or the recorder's mailbox, can be.
     Long,
 }
 
@@ -29,7 +29,7 @@ impl LossCause {
     /// All of them.
     pub const ALL: [Self; 6] = [Self::Way, Self::Away, Self::Recorder, Self::Processor, Self::Disk, Self::Long];
 
-    /// Its name in files.
+    /// The cause's name in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Way => "way",

@@ -121,7 +121,7 @@ struct Source {
     next: Option<Found>,
     /// What it says of its losses; the last counts.
     lost: BTreeMap<String, u64>,
-    /// The same with causes.
+    /// Messages lost, by topic and cause.
     lost_by: BTreeMap<String, u64>,
 }
 

@@ -6,9 +6,9 @@ use std::time::Instant;
 /// What a thread did since it began, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Spent {
-    /// It ran.
+    /// The thread ran.
     ran: u64,
-    /// It could have run, and other threads had the processor.
+    /// The thread could have run, and others had the processor.
     waited: u64,
 }
 
@@ -43,7 +43,7 @@ impl Pace {
         Self { since: Instant::now(), spent: read(&path), path }
     }
 
-    /// It is not late now.
+    /// The thread is not late now.
     pub fn begin(&mut self) {
         (self.since, self.spent) = (Instant::now(), read(&self.path));
     }

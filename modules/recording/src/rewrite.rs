@@ -25,7 +25,7 @@ pub(crate) struct Rewriter {
     channels: BTreeMap<(usize, u16), u16>,
     chunk_bytes: usize,
     messages: u64,
-    /// It says that it is of another program: what that wrote under words of ours stays.
+    /// The new file says that it is of another program: what that wrote under words of ours stays.
     keeps_theirs: bool,
 }
 

@@ -238,7 +238,7 @@ pub struct ClockState {
 /// Why a router begins no new epoch.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema, thiserror::Error)]
 pub enum NewEpochError {
-    /// Its node is not the master of time.
+    /// The router's node is not the master of time.
     #[error("its node is not the master of time; `rohrpost time` shows which is")]
     NotMaster,
     /// Each one has all nodes measure their clocks anew.

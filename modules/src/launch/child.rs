@@ -76,7 +76,7 @@ pub(super) struct Child {
     stop_within: Duration,
     phase: Phase,
     process: Option<ModuleProcess>,
-    /// Its present process has joined the node as the module, or its last one had.
+    /// The present process has joined the node as the module, or the last one had.
     has_joined: bool,
     mailboxes: Mailboxes,
     /// Its process has ended so, then; what it printed last may still come.

@@ -18,7 +18,7 @@ pub(super) struct Health {
     error: String,
     /// That is why it is in error now, which is the one of this number.
     present: Option<u32>,
-    /// It is on all the same, and only says what does not work: that is no error any more when it is over.
+    /// The module is on all the same, and only says what does not work: that is no error any more when it is over.
     is_complaint: bool,
 }
 

@@ -67,7 +67,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const LOOK_SWITCHING: Duration = Duration::from_millis(50);
 /// While all modules are being stopped, it is looked so often which one may be told next.
 const LOOK_ENDING: Duration = Duration::from_millis(20);
-/// It is looked so often whether the computer's clock was set.
+/// How often launch looks whether the computer's clock was set.
 const LOOK_CLOCK: Duration = Duration::from_secs(1);
 /// By then no thread of launch's holds its place on the node any more.
 const LET_GO: Duration = Duration::from_secs(1);

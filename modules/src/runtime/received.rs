@@ -44,7 +44,7 @@ impl<'a> Received<'a> {
         Self { from, number, mailbox, head, value, origin, record: None }
     }
 
-    /// The same, of this record, before which so much was missed.
+    /// A subscription's value: this record, before which so much was missed.
     pub(super) fn held(self, record: &'a HeldRecord<'a>, missed: Missed) -> Self {
         Self { record: Some((record, missed)), ..self }
     }

@@ -18,7 +18,7 @@ pub(crate) struct Index {
     pub(crate) attachments: Vec<AttachmentIndex>,
     /// Others may count nothing.
     pub(crate) statistics: Option<Statistics>,
-    /// Its sum says that it is right. Others may write none.
+    /// The index has a sum, which is right. Others may write none.
     pub(crate) is_checked: bool,
     /// Where the file's last record begins.
     footer_at: u64,

@@ -78,7 +78,7 @@ impl Selected {
         self.channels.iter().map(|(id, wanted)| (*id, &wanted.channel))
     }
 
-    /// Its attachments, once: for a new file that is made of it.
+    /// Attachments of the file, once: for a new file that is made of it.
     pub(crate) fn take_attachments(&mut self) -> Vec<Attachment> {
         std::mem::take(&mut self.attachments)
     }

@@ -22,7 +22,7 @@ pub(super) struct OpenChunk {
 
 /// A chunk as it goes to the file.
 pub(super) struct PackedChunk {
-    /// Its record, and those of its index.
+    /// The chunk's record, and those of its index.
     pub(super) bytes: Vec<u8>,
     /// The first record alone.
     pub(super) chunk_bytes: u64,

@@ -50,7 +50,7 @@ struct Numbered {
 
 /// A definition, and where it is in the file.
 struct Copies {
-    /// Its record's body behind the number.
+    /// Body of the definition's record behind the number.
     rest: Arc<[u8]>,
     /// In so many chunks.
     count: u32,
@@ -234,7 +234,8 @@ impl OpenFile {
         }
     }
 
-    /// The same of a type. It may be larger than its channels, and is due less often than all of them together.
+    /// Puts a type into the present chunk, if that is to have it. A type may be larger than its channels, and is due
+    /// less often than all of them together.
     fn describe_schema(&mut self, number: u16) {
         let (chunk, at) = (self.chunk_number, self.bytes());
         if let Some(its) = self.schemas.get(number).filter(|its| its.is_due(chunk, at)) {

@@ -41,7 +41,7 @@ impl IncomingReplica {
         self.publish_before(now, u64::MAX);
     }
 
-    /// The same of records before this one.
+    /// Publishes records before this one that are whole and wait for nothing older.
     pub(super) fn publish_before(&mut self, now: Now<'_>, sequence: u64) {
         while self.open.first().is_some_and(|oldest| oldest.is_whole() && oldest.sequence < sequence) {
             self.publish_oldest(now);
