@@ -10,7 +10,7 @@ use rohrpost::interfaces::{
 };
 use rohrpost::wire::from_bytes;
 use rohrpost_config::{Reach, TimeSource};
-use rohrpost_launch::launcher::launcher_of;
+use rohrpost_launch::launcher::{AskLaunch, launcher_of};
 use rohrpost_mailbox::{SystemClock, TimeRecord, monotonic_ns, realtime_ns};
 use rohrpost_modules::runtime::clock_was_set;
 use serde::Serialize;

@@ -113,7 +113,7 @@ pub fn spinning(bytes: usize) -> Latency {
 
 /// The few cases that tell in seconds how this computer does: blocking and spinning beside the two floors.
 pub fn self_test(scheduling: Scheduling) -> Vec<Box<dyn Case>> {
-    let few = |case| Box::new(Latency { scheduling, messages: MESSAGES_FEW, ..case }) as Box<dyn Case>;
+    let few = |case: Latency| -> Box<dyn Case> { Box::new(Latency { scheduling, messages: MESSAGES_FEW, ..case }) };
     [blocking(64), blocking(1024), spinning(64), spinning(1024)].map(few).into()
 }
 

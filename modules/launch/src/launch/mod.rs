@@ -13,8 +13,8 @@
 //! One thread turns round and round: it looks after each module, moves the calls on that switch modules on, and answers
 //! tools (`serve`). Nothing in it waits for a module. It sleeps on launch's mailboxes; signals ring the same bell.
 //!
-//! If launch dies, the kernel tells each module (see `start.rs` of `rohrpost-modules`), which goes to its safe state and ends; one that
-//! cannot is ended by the next launch.
+//! If launch dies, the kernel tells each module (`rohrpost_modules::runtime`), which goes to its safe state and ends;
+//! one that cannot is ended by the next launch.
 
 mod child;
 mod end;
