@@ -1,8 +1,8 @@
 //! Rohrpost's mailboxes and streams, measured beside the floors of this very computer and beside what else could be
 //! used.
 //!
-//! Rounds, harness, statistics and table are those of `rohrpost_bench_local`; here are the cases, and how each contender
-//! sends: `streams` · `one_way` · `lan` · `tdma` · `tcp` ours, `floors`, `peers`, and `foreign` programs.
+//! Harness, rounds, statistics and table are those of `rohrpost_bench_local`. Here are the cases, and how contenders
+//! send: ours in `streams`, `one_way`, `lan`, `tdma` and `tcp`, then `floors`, `peers`, and programs in `foreign`.
 //!
 //! A case is added in `cases`: anything that has a name and gives rows.
 

@@ -23,11 +23,8 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
 }
 
 fn blocking() -> Vec<Latency> {
-    let case = |bytes| {
-        let case = latency::blocking(bytes).beside(POSIX_QUEUE, at_most(1.0), None);
-        let case = case.beside(ICEORYX_LISTENER, None, None);
-        case
-    };
+    let case =
+        |bytes| latency::blocking(bytes).beside(POSIX_QUEUE, at_most(1.0), None).beside(ICEORYX_LISTENER, None, None);
     [64, 1024, 16_384, 62_000].map(case).into()
 }
 
@@ -35,16 +32,14 @@ fn one_core() -> Vec<Latency> {
     let mut case = Latency::new("one-core", 64, How::Blocking);
     case.placement = Placement::OneCore;
     let case = case.beside(FUTEX, at_most(1.10), None).beside(POSIX_QUEUE, None, None);
-    let case = case.beside(ICEORYX_LISTENER, None, None);
-    vec![case]
+    vec![case.beside(ICEORYX_LISTENER, None, None)]
 }
 
 fn spinning() -> Vec<Latency> {
     let case = |bytes| {
         let core = if bytes == 64 { at_most(1.3) } else { None };
         let case = latency::spinning(bytes).beside(SLOT_CORE, core, None);
-        let case = case.beside(ICEORYX_SPINNING, None, None).beside(CROSSBEAM, None, None);
-        case
+        case.beside(ICEORYX_SPINNING, None, None).beside(CROSSBEAM, None, None)
     };
     [64, 1024, 16_384].map(case).into()
 }
@@ -52,8 +47,7 @@ fn spinning() -> Vec<Latency> {
 fn loaned() -> Vec<Latency> {
     let case = |bytes| {
         let case = Latency::new("loaned", bytes, How::Loaned).beside(SPIN_SMALL, at_most(1.5), None);
-        let case = case.beside(ICEORYX_LOANED, None, None);
-        case
+        case.beside(ICEORYX_LOANED, None, None)
     };
     [64, 1024, 16_384, 62_000].map(case).into()
 }

@@ -32,7 +32,7 @@ pub trait CommandHandler {
 
 /// A command mailbox, and what was run of what came there.
 pub struct CommandServer {
-    /// Where they come.
+    /// Mailbox in which commands arrive.
     pub commands: Receiver,
     deduplicator: Deduplicator,
     /// The result being written; kept, so that answering allocates nothing.
@@ -175,14 +175,14 @@ fn answer(
 
 /// A command that is to be run.
 pub struct Command<'a> {
-    /// Of its function.
+    /// Number of the function that is called.
     pub number: u16,
     pub(crate) head: Head,
     /// Hash of the interface that the caller knows.
     hash: u32,
     /// The caller's.
     pub(crate) incarnation: u32,
-    /// Postcard of a tuple.
+    /// Arguments: postcard of a tuple.
     pub arguments: &'a [u8],
 }
 
