@@ -66,8 +66,8 @@ pub use rohrpost_modules::runtime::{
 };
 pub use rohrpost_modules::serde;
 pub use rohrpost_modules::{
-    Module, ModuleError, choice, common, data, description, fusion, interface, interfaces, launch, launcher, output,
-    parameter, parameters, run, schema, survey, types, wire,
+    Module, ModuleError, choice, common, data, description, fusion, interface, interfaces, output, parameter,
+    parameters, run, schema, types, wire,
 };
 
 /// What a module says: events become lines of output.

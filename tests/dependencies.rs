@@ -32,7 +32,7 @@ const DOUBLED: [(&str, &str); 7] = [
 ];
 
 /// Our tools, or crates that only tools need.
-const NOT_FOR_MODULES: [&str; 17] = [
+const NOT_FOR_MODULES: [&str; 20] = [
     "clap",
     "comfy-table",
     "flate2",
@@ -44,15 +44,18 @@ const NOT_FOR_MODULES: [&str; 17] = [
     "rcgen",
     "rerun",
     "rohrpost-bench",
+    "rohrpost-bench-local",
     "rohrpost-builtin",
+    "rohrpost-launch",
     "rohrpost-native",
     "rohrpost-recording",
     "rohrpost-robot",
+    "rohrpost-router-daemon",
     "rustls",
     "serde_json",
 ];
-/// Peers that only benches need, and the own dependencies of the GUI bridge and of the package in Python.
-const NOT_FOR_THE_COMMAND: [&str; 4] = ["iceoryx2", "pyo3", "rerun", "zenoh"];
+/// The bench and its peers, and the own dependencies of the GUI bridge and of the package in Python.
+const NOT_FOR_THE_COMMAND: [&str; 5] = ["iceoryx2", "pyo3", "rerun", "rohrpost-bench", "zenoh"];
 
 struct Crate {
     name: String,

@@ -32,11 +32,15 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "what both sides say is a part of the slot core, which the proofs take whole",
     ),
     (
-        "modules/src/launch/child.rs",
-        "modules/src/launch/child/ending.rs",
+        "modules/launch/src/launch/child.rs",
+        "modules/launch/src/launch/child/ending.rs",
         "one state of a child, which changes the child",
     ),
-    ("modules/src/launch/mod.rs", "modules/src/launch/start.rs", "one state of launch, which changes launch"),
+    (
+        "modules/launch/src/launch/mod.rs",
+        "modules/launch/src/launch/start.rs",
+        "one state of launch, which changes launch",
+    ),
     (
         "modules/src/output/layer.rs",
         "modules/src/output/way.rs",
@@ -65,7 +69,11 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "what a clock remembers in time slots, and does there",
     ),
     ("tests/testbed/src/sim/plan/draw.rs", "tests/testbed/src/sim/plan/mod.rs", "a plan, and how its parts are drawn"),
-    ("modules/src/survey.rs", "modules/src/survey/standing.rs", "a module at one moment, and in which state that is"),
+    (
+        "modules/launch/src/survey.rs",
+        "modules/launch/src/survey/standing.rs",
+        "a module at one moment, and in which state that is",
+    ),
 ];
 
 /// Type names that several files of a crate use, each for a type of its own, and the reason.
@@ -87,7 +95,7 @@ const LONG: &[(&str, usize)] = &[
     ("mailbox/src/slots.rs", 423),
     ("modules/src/call/deduplicator_simulation.rs", 403),
     ("modules/src/output/way.rs", 438),
-    ("modules/tests/launch.rs", 404),
+    ("modules/launch/tests/launch.rs", 404),
     ("routers/src/outbound/tests/mod.rs", 461),
     ("routers/src/time/clock.rs", 420),
     ("routers/src/time/clock/slots.rs", 437),

@@ -4,7 +4,7 @@
 
 mod run;
 
-use rohrpost_bench::harness::Scratch;
+use rohrpost_bench_local::harness::Scratch;
 use rohrpost_c::code::Code;
 use rohrpost_c::mailbox::{
     MailboxShape, PackageInHand, PackageLabel, ReceiverHandle, SenderHandle, rohrpost_receive, rohrpost_receiver_open,

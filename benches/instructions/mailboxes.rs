@@ -1,7 +1,7 @@
 //! A package of 64 bytes through a mailbox, and the bytes of a typical message.
 
 use super::Path;
-use rohrpost_bench::harness::Scratch;
+use rohrpost_bench_local::harness::Scratch;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
 use rohrpost_modules::types::{Odometry, Pose, Twist};
 use rohrpost_modules::wire;

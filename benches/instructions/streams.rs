@@ -1,7 +1,7 @@
 //! A record of 64 bytes through a stream, and the two records around a time.
 
 use super::Path;
-use rohrpost_bench::harness::Scratch;
+use rohrpost_bench_local::harness::Scratch;
 use rohrpost_mailbox::{
     Around, Name, Next, Node, Participant, Stamp, StreamId, StreamReader, StreamShape, StreamWriter,
 };

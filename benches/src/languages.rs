@@ -1,9 +1,10 @@
 //! What programs in other languages need: a compiler and the library for C, an interpreter and packages for Python.
 //!
-//! Their sources stand in `benches/languages`; how they talk to the bench, [`crate::harness::ForeignProgram`] says.
+//! Their sources stand in `benches/languages`; how they talk to the bench, [`crate::foreign::ForeignProgram`] says.
 
-use crate::harness::{Failure, ForeignProgram};
-use crate::settings::Settings;
+use crate::foreign::ForeignProgram;
+use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::settings::Settings;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! `cargo run --release -p rohrpost-bench -- local`, `streams`, `recording`, `lan`, `tdma`, `tcp` or `languages`.
 
 use clap::{Parser, Subcommand};
-use rohrpost_bench::cases::Case;
+use rohrpost_bench::cases;
 use rohrpost_bench::counting::CountingHeap;
-use rohrpost_bench::{Failure, Settings, cases, report};
+use rohrpost_bench_local::{Case, Failure, Settings, report};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -26,19 +26,14 @@ enum Command {
     /// Streams between processes of one computer.
     Streams(Run),
     /// Recordings: the recorder beside the crate that it writes with.
-    #[cfg(feature = "recording")]
     Recording(Run),
     /// Packages between nodes, over routers: two network namespaces of this computer.
-    #[cfg(feature = "lan")]
     Lan(Run),
     /// Time slots: three network namespaces of this computer.
-    #[cfg(feature = "lan")]
     Tdma(Run),
     /// Packages between systems, over the TCP router: the loopback device.
-    #[cfg(feature = "lan")]
     Tcp(Run),
     /// Programs in C and in Python, beside the same in Rust.
-    #[cfg(feature = "languages")]
     Languages {
         #[command(flatten)]
         run: Run,
@@ -80,21 +75,16 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Local(run) => measure(&run, &cases::all()),
         Command::Streams(run) => measure(&run, &cases::streams::all()),
-        #[cfg(feature = "recording")]
         Command::Recording(run) => measure(&run, &cases::recording::all()),
-        #[cfg(feature = "lan")]
         Command::Lan(run) => {
             rohrpost_bench::lan::prepare();
             measure(&run, &cases::lan::all())
         }
-        #[cfg(feature = "lan")]
         Command::Tdma(run) => {
             rohrpost_bench::lan::prepare();
             measure(&run, &cases::tdma::all())
         }
-        #[cfg(feature = "lan")]
         Command::Tcp(run) => measure(&run, &cases::tcp::all()),
-        #[cfg(feature = "languages")]
         Command::Languages { run, python } => measure_languages(&run, python),
     };
     match done {
@@ -112,7 +102,6 @@ fn measure(arguments: &Run, cases: &[Box<dyn Case>]) -> Result<bool, Failure> {
     run(arguments, &settings(arguments), cases)
 }
 
-#[cfg(feature = "languages")]
 fn measure_languages(arguments: &Run, python: Option<PathBuf>) -> Result<bool, Failure> {
     use rohrpost_bench::languages::{Interpreter, c_version};
     let mut settings = Settings { python, ..settings(arguments) };

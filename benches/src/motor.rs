@@ -1,14 +1,14 @@
 //! A module that does nothing but answer: what commands are measured with. It is this program again, in a process of
 //! its own.
 
-use crate::harness::{Child, End, Failure, Placement, Scheduling, settle};
+use rohrpost_bench_local::harness::{Child, End, Failure, Placement, Scheduling, settle};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, node_directory};
 use rohrpost_modules::call::Caller;
 use rohrpost_modules::interface::Proxy;
 use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy};
 use rohrpost_modules::runtime::{Context, Start, ToolLink, run_started};
-use rohrpost_modules::{Module, ModuleError};
+use rohrpost_modules::{Module, ModuleError, NoSettings};
 use std::error::Error;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
@@ -97,11 +97,6 @@ impl Module for CommandedMotor {
         Ok(Self { speed_m_s: 0.0 })
     }
 }
-
-/// Of modules that are told nothing by their configuration.
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct NoSettings {}
 
 impl Motor for CommandedMotor {
     fn drive(&mut self, speed_m_s: f64, _: f64) -> Result<(), DriveError> {

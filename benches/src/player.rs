@@ -1,13 +1,13 @@
 //! A module that plays ping-pong with another one by data: each subscribes to what the other publishes. The same in
 //! Python is `benches/languages/player.py`. It is this program again, with the arguments of a
-//! [`crate::harness::ForeignProgram`].
+//! [`crate::foreign::ForeignProgram`].
 
-use crate::harness::{Cell, Failure, ForeignProgram, Pause, Placement, SAMPLES_MIN, Scheduling, check_echo, fill};
-use crate::motor::NoSettings;
+use crate::foreign::ForeignProgram;
 use nix::sys::signal::{Signal, raise};
+use rohrpost_bench_local::harness::{Cell, Failure, Pause, Placement, SAMPLES_MIN, Scheduling, check_echo, fill};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_modules::runtime::{Context, Rate, Received, Start, Subscription, run_started};
-use rohrpost_modules::{Module, ModuleError};
+use rohrpost_modules::{Module, ModuleError, NoSettings};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

@@ -1,11 +1,11 @@
 //! `rohrpost bench local`: how fast this computer passes packages between processes, next to its hardware floor.
 
 use crate::terminal::{Failure, complain, say};
-use rohrpost_bench::environment::Environment;
-use rohrpost_bench::harness::Scheduling;
-use rohrpost_bench::report::{self, Report};
-use rohrpost_bench::rounds::Row;
-use rohrpost_bench::{Settings, cases};
+use rohrpost_bench_local::environment::Environment;
+use rohrpost_bench_local::harness::Scheduling;
+use rohrpost_bench_local::report::{self, Report};
+use rohrpost_bench_local::rounds::Row;
+use rohrpost_bench_local::{Settings, latency};
 use rohrpost_mailbox::{Node, base_directory};
 use std::fs;
 use std::path::PathBuf;
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         ));
     }
     let settings = Settings { rounds: ROUNDS, ..Settings::default() };
-    let report = report::run(&settings, &cases::self_test(scheduling), arguments.json, say)?;
+    let report = report::run(&settings, &latency::self_test(scheduling), arguments.json, say)?;
     if !arguments.json {
         say(format!("\n{}", meaning(&report, scheduling, &Hints::look())));
     }
@@ -148,8 +148,8 @@ fn look_at(environment: &Environment, scheduling: Scheduling, hints: &Hints) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost_bench::rounds::Versus;
-    use rohrpost_bench::statistics::{Ratio, Summary};
+    use rohrpost_bench_local::rounds::Versus;
+    use rohrpost_bench_local::statistics::{Ratio, Summary};
 
     fn row(floor: &'static str, contender: &'static str, ratio: f64, p99: f64) -> Row {
         let p50 = if floor == "spin" { 0.5 } else { 8.0 };
@@ -198,7 +198,7 @@ mod tests {
         let hints = Hints { governor: None, is_virtual: false, is_slow_build: true };
         assert!(meaning(&report, Scheduling::Fifo, &hints).starts_with("NOTHING"));
         report.rows = vec![row("futex", "rohrpost", 1.0, 1.0), row("spin", "rohrpost", 1.0, 1.0)];
-        report.rows[0].result = Err(rohrpost_bench::Failure::Skipped("no second processor".into()));
+        report.rows[0].result = Err(rohrpost_bench_local::Failure::Skipped("no second processor".into()));
         assert!(meaning(&report, Scheduling::Fifo, &hints).starts_with("NO ANSWER"));
     }
 }

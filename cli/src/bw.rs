@@ -5,7 +5,7 @@ use super::target::Target;
 use super::units::{bytes, short};
 use super::watch::{FlowFigures, Pace};
 use crate::terminal::{Failure, say, say_folded};
-use rohrpost::survey::is_hop;
+use rohrpost_launch::survey::is_hop;
 use rohrpost_mailbox::{FlowInfo, Type};
 use serde_json::json;
 use std::process::ExitCode;

@@ -2,10 +2,10 @@
 
 use super::target::{Running, Target};
 use crate::terminal::{Failure, say};
-use rohrpost::launcher::{ChildState, ControlError, Phase};
 use rohrpost::output::plain;
-use rohrpost::survey::Scope;
 use rohrpost::{CallError, ToolLink};
+use rohrpost_launch::launcher::{AskLaunch, ChildState, ControlError, Phase};
+use rohrpost_launch::survey::Scope;
 use rohrpost_mailbox::{ModuleState, Name};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};

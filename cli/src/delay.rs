@@ -8,7 +8,7 @@ use super::units::short;
 use super::watch::{Pace, Window};
 use crate::terminal::{Failure, say};
 use rohrpost::Name;
-use rohrpost::survey::{Scope, Survey, purpose};
+use rohrpost_launch::survey::{Scope, Survey, purpose};
 use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, Kind, Latency, MailboxInfo};
 use serde::Serialize;
 use std::process::ExitCode;

@@ -32,7 +32,7 @@ use rohrpost::Name;
 use rohrpost::common::State;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CartographerInterface, MapCounts, PlayerInterface, Progress};
-use rohrpost::launch::{Launch, choose_node, events};
+use rohrpost_launch::{Launch, choose_node, events};
 use rohrpost_mailbox::{ClassTraffic, saturating_sum};
 use std::process::ExitCode;
 use std::sync::Arc;

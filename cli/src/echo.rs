@@ -112,7 +112,7 @@ fn follow(
     let (mut renew_at, mut count) = (Instant::now(), 0);
     let mut last_at = Instant::now();
     let mut unreadable = UnreadableValues::default();
-    let stop = rohrpost::launch::events()?;
+    let stop = rohrpost_launch::events()?;
     loop {
         if Instant::now() >= renew_at {
             let write = |body: &mut Vec<u8>| rohrpost::wire::append(body, &wish);
@@ -124,7 +124,7 @@ fn follow(
                 return Err(failure);
             }
         }
-        if let Ok(rohrpost::launch::Event::Stop) = stop.try_recv() {
+        if let Ok(rohrpost_launch::Event::Stop) = stop.try_recv() {
             return Ok(());
         }
         if !patience.is_zero() && last_at.elapsed() > patience {

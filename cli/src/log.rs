@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 impl Show<'_> {
     fn all(&self, reader: &mut Reader<'_>, tool: &mut rohrpost::ToolLink) -> Result<(), Failure> {
-        let stop = rohrpost::launch::events()?;
+        let stop = rohrpost_launch::events()?;
         // With --last, earlier lines are shown after all of them have been read.
         let mut last = VecDeque::new();
         let keep = |line: OutputLine| {
@@ -83,7 +83,7 @@ impl Show<'_> {
             return Ok(());
         }
         while self.pages(reader, tool, |line| self.line(&line))? && self.arguments.follow {
-            if let Ok(rohrpost::launch::Event::Stop) = stop.recv_timeout(POLL) {
+            if let Ok(rohrpost_launch::Event::Stop) = stop.recv_timeout(POLL) {
                 break;
             }
         }

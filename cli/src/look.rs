@@ -10,13 +10,13 @@ use rohrpost::common::GET_DATA;
 use rohrpost::description::noted;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
-use rohrpost::launcher::{SnapshotRequest, launcher_of};
 use rohrpost::output::plain;
 use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
-use rohrpost::survey::{MailboxSnapshot, Scope, Snapshot, Standing, Survey, look_at_all};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_config::Installation;
+use rohrpost_launch::launcher::{SnapshotRequest, launcher_of};
+use rohrpost_launch::survey::{MailboxSnapshot, Scope, Snapshot, Standing, Survey, look_at_all};
 use rohrpost_mailbox::{InspectError, Name};
 use std::collections::BTreeSet;
 

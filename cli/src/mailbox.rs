@@ -6,8 +6,8 @@ use super::target::{Running, Target};
 use super::units::fine;
 use crate::terminal::{Failure, say, say_folded};
 use rohrpost::Name;
-use rohrpost::survey::{MailboxSnapshot, Scope, purpose};
 use rohrpost_config::{Installation, nearest};
+use rohrpost_launch::survey::{MailboxSnapshot, Scope, purpose};
 use rohrpost_mailbox::{
     ClassTraffic, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, OverflowPolicy, Party, Priority, SlotInfo,
     WaitingPackage, saturating_sum,

@@ -1,8 +1,7 @@
 //! The `rohrpost` command: one file or folder for each subcommand.
 //!
-//! `look` reads a node, near or far. `router` and `tcp` make modules of the routers' cores. `launch` opens their
-//! sockets, `manager` talks to systemd, `speech` prints without waiting for a reader. Golden files hold what `top` and
-//! `doctor` show.
+//! `look` reads a node, near or far. `launch` opens the routers' sockets, `manager` talks to systemd, `speech` prints
+//! without waiting for a reader. Golden files hold what `top` and `doctor` show.
 
 #![forbid(unsafe_code)]
 // All output goes through `say` and `complain`, which escape what a terminal would obey.

@@ -3,8 +3,8 @@
 //! The protocol is sd_notify(3): lines in a datagram. The existing crate blocks when the manager does not read, and
 //! knows no abstract sockets; launch must never block, and containers use such sockets.
 
-use rohrpost::launch::Launch;
-use rohrpost::launcher::Phase;
+use rohrpost_launch::Launch;
+use rohrpost_launch::launcher::Phase;
 use std::collections::VecDeque;
 use std::ffi::OsStr;
 use std::io::{self, ErrorKind};

@@ -2,12 +2,12 @@
 
 use super::units::short;
 use crate::terminal::Failure;
-use rohrpost::launcher::launcher_of;
 use rohrpost::output::plain;
-use rohrpost::survey::LookFailure;
 use rohrpost::{CallError, Fault, ToolLink};
 use rohrpost_builtin::format::iso;
 use rohrpost_config::Installation;
+use rohrpost_launch::launcher::launcher_of;
+use rohrpost_launch::survey::LookFailure;
 use rohrpost_mailbox::{SendError, realtime_ns};
 use serde::Serialize;
 use std::cell::RefCell;

@@ -5,7 +5,7 @@ use super::watch::{FlowFigures, Tracks};
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;
 use rohrpost::output::plain;
-use rohrpost::survey::{Scope, Survey};
+use rohrpost_launch::survey::{Scope, Survey};
 use rohrpost_mailbox::{FlowInfo, Type};
 use std::time::Duration;
 

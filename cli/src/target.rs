@@ -3,12 +3,12 @@
 use super::observer::Observer;
 use crate::terminal::Failure;
 use clap::Args;
-use rohrpost::launch::{CONFIG_FILE, choose_node};
-use rohrpost::launcher::launcher_of;
 use rohrpost::output::plain;
-use rohrpost::survey::{Scope, Standing, node_of};
 use rohrpost::{Fault, ToolLink};
 use rohrpost_config::Installation;
+use rohrpost_launch::launcher::launcher_of;
+use rohrpost_launch::survey::{Scope, Standing, node_of};
+use rohrpost_launch::{CONFIG_FILE, choose_node};
 use rohrpost_mailbox::{Name, Node, NodeError, SendError, local, node_directory};
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;

@@ -8,11 +8,11 @@ use crate::terminal::{Failure, say};
 use rohrpost::interfaces::{
     BeyondLink, BeyondTime, ClockRole, ClockState, NewEpochError, RouterInterface, TcpInterface,
 };
-use rohrpost::launch::clock_was_set;
-use rohrpost::launcher::launcher_of;
 use rohrpost::wire::from_bytes;
 use rohrpost_config::{Reach, TimeSource};
+use rohrpost_launch::launcher::{AskLaunch, launcher_of};
 use rohrpost_mailbox::{SystemClock, TimeRecord, monotonic_ns, realtime_ns};
+use rohrpost_modules::runtime::clock_was_set;
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};

@@ -2,9 +2,9 @@
 
 use super::table::time;
 use crate::terminal::Failure;
-use rohrpost::launch::{Event, events};
 use rohrpost_builtin::format::iso;
 use rohrpost_config::{parse_size, size_text};
+use rohrpost_launch::{Event, events};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 

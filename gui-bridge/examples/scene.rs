@@ -2,9 +2,9 @@
 //! scene.rrd`, then `rerun scene.rrd` or `cargo xtask picture scene.rrd scene.png`.
 
 use rohrpost::schema::Value;
-use rohrpost::survey::Standing;
 use rohrpost::types::{Cell, LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use rohrpost_gui_bridge::{Level, Scene, Sink};
+use rohrpost_launch::survey::Standing;
 use std::f64::consts::TAU;
 
 const HZ: u64 = 20;

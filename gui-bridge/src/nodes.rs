@@ -1,9 +1,9 @@
 //! What runs on all nodes. The own node is read directly; launch reports the others. Nothing here waits.
 
-use rohrpost::launcher::{SnapshotRequest, launcher_of};
-use rohrpost::survey::{Distant, Scope, Snapshot, Survey};
 use rohrpost::{Class, Context, Name};
 use rohrpost_config::Installation;
+use rohrpost_launch::launcher::{SnapshotRequest, launcher_of};
+use rohrpost_launch::survey::{Distant, Scope, Snapshot, Survey};
 use rohrpost_mailbox::{Latency, Node, NodeError, local};
 use std::collections::BTreeMap;
 use std::sync::Arc;

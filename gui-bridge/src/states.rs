@@ -3,7 +3,7 @@
 use crate::scene::{Scene, entity};
 use rerun::{StateChange, StateConfiguration, TextDocument, TextLog, TextLogLevel};
 use rohrpost::common::OutputLevel;
-use rohrpost::survey::Standing;
+use rohrpost_launch::survey::Standing;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -10,9 +10,9 @@ use rohrpost::description::{DescriptionRequest, noted};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
 use rohrpost::schema::{DataItem, DataKind, Description};
-use rohrpost::survey::node_of;
 use rohrpost::{Context, ContextError, Name, Rate, Received, Subscription};
 use rohrpost_config::{Installation, Show};
+use rohrpost_launch::survey::node_of;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Node, local};
 use std::time::{Duration, Instant};
 

@@ -20,7 +20,7 @@ use crate::view::{Datum, View, is};
 use rerun::Clear;
 use rohrpost::interfaces::{BeyondLink, BeyondState};
 use rohrpost::schema::{DataItem, Description, counters};
-use rohrpost::survey::Standing;
+use rohrpost_launch::survey::Standing;
 use std::collections::HashMap;
 
 /// Entities above what is true at its moment only.

@@ -141,6 +141,11 @@ pub trait Module: Sized {
     }
 }
 
+/// Settings of a module that its configuration tells nothing.
+#[derive(Clone, Copy, Debug, Default, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoSettings {}
+
 /// Why a module cannot work, in words for its user. `?` converts any error into it.
 ///
 /// ```

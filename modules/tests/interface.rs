@@ -7,7 +7,6 @@ use rohrpost_modules::common::HASH;
 use rohrpost_modules::interface;
 use rohrpost_modules::interface::{DataPort, Interface, Serve, StreamPort};
 use rohrpost_modules::interfaces::{CartographerInterface, CollectorInterface, LaserInterface, MotorInterface};
-use rohrpost_modules::launcher::LauncherInterface;
 use rohrpost_modules::schema::{DataKind, Description, Schema, describe_field};
 
 /// Opens and closes.
@@ -105,7 +104,6 @@ fn what_modules_say_comes_back() {
         CartographerInterface::description(),
         CollectorInterface::description(),
         LaserInterface::description(),
-        LauncherInterface::description(),
         MotorInterface::description(),
     ] {
         assert_eq!(Description::from_bytes(&description.to_bytes()), Ok(description));

@@ -3,7 +3,7 @@
 use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::CallError;
-use rohrpost::launcher::{ChildState, ControlError, Phase};
+use rohrpost_launch::launcher::{AskLaunch, ChildState, ControlError, Phase};
 use std::time::{Duration, Instant};
 
 fn child(place: &crate::harness::Robot, module: &str) -> ChildState {

@@ -4,7 +4,7 @@ use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, runs, wait};
 use crate::process::Running;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost::launcher::{Phase, launcher_of};
+use rohrpost_launch::launcher::{AskLaunch, Phase, launcher_of};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 

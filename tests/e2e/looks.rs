@@ -3,9 +3,9 @@
 use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
-use rohrpost::launcher::{LauncherInterface, LookError, LookPage, SnapshotRequest};
-use rohrpost::survey::{LookFailure, MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
 use rohrpost::wire::{append, from_bytes};
+use rohrpost_launch::launcher::{LauncherInterface, LookError, LookPage, SnapshotRequest};
+use rohrpost_launch::survey::{LookFailure, MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
 use rohrpost_mailbox::{FlowInfo, Name};
 use std::time::{Duration, Instant};
 

@@ -34,7 +34,7 @@ fn a_node_of_another_user_is_told_and_not_obeyed() {
 fn a_pipe_among_the_files_of_a_node_keeps_no_tool_waiting() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[OUTPUT]);
-    let config = robot.node.path().join(rohrpost::launch::CONFIG_FILE);
+    let config = robot.node.path().join(rohrpost_launch::CONFIG_FILE);
     let put_pipe = |name: &str| {
         let path = robot.node.path().join(name);
         fs::remove_file(&path).unwrap();
@@ -43,7 +43,7 @@ fn a_pipe_among_the_files_of_a_node_keeps_no_tool_waiting() {
     put_pipe("children");
     place.say(&["list"]).ok();
     let noted = fs::read(&config).unwrap();
-    put_pipe(rohrpost::launch::CONFIG_FILE);
+    put_pipe(rohrpost_launch::CONFIG_FILE);
     let told = place.say(&["list"]).fails();
     assert!(told.contains("it is a named pipe, not a file"), "{told}");
     fs::remove_file(&config).unwrap();

@@ -6,7 +6,7 @@ use crate::probe::WORK;
 use crate::process::{Running, without_real_time};
 use crate::terminal::Terminal;
 use nix::sys::signal::Signal;
-use rohrpost::survey::Standing;
+use rohrpost_launch::survey::Standing;
 use serde_json::Value;
 use std::time::Duration;
 

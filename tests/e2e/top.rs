@@ -4,7 +4,7 @@ use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::process::Running;
 use crate::terminal::Terminal;
 use nix::sys::signal::Signal;
-use rohrpost::launcher::{ChildState, Phase};
+use rohrpost_launch::launcher::{AskLaunch, ChildState, Phase};
 use std::process::Stdio;
 
 /// Top refreshes often, so that tests need not wait.

@@ -68,7 +68,7 @@ fn a_mailbox_of_another_version_is_told_from_a_broken_one() {
 fn what_launch_of_another_version_noted_is_not_guessed_at() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
-    let noted = robot.node.path().join(rohrpost::launch::CONFIG_FILE);
+    let noted = robot.node.path().join(rohrpost_launch::CONFIG_FILE);
     let text = std::fs::read_to_string(&noted).unwrap();
     std::fs::write(&noted, "{ \"something\": \"else\" }").unwrap();
     let told = place.say(&["list"]).fails();

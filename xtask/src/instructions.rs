@@ -147,9 +147,8 @@ fn build() -> Result<Vec<PathBuf>, Failure> {
     if !valgrind.is_ok_and(|output| output.status.success()) {
         return Err("no valgrind, which counts instructions; install it: `apt-get install valgrind`".into());
     }
-    let package = ["--package", "rohrpost-bench", "--no-default-features", "--features", "lan"];
-    let mut build = cargo(&["build", "--release", "--bench", "instructions", "--bench", "instructions-c"]);
-    build.args(package);
+    let mut build = cargo(&["build", "--release", "--package", "rohrpost-bench-local"]);
+    build.args(["--bench", "instructions", "--bench", "instructions-c"]);
     cargo::run("building the hot paths", &mut build)?;
     // Cargo says which files it made; the names have hashes.
     let output = build.arg("--message-format=json").output().map_err(|error| format!("cargo: {error}"))?;

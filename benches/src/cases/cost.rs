@@ -3,16 +3,16 @@
 //! The receiver has taken everything before the clock starts, and polls for more. Only the sends are timed; the time of
 //! the clock reading itself is measured before and subtracted.
 
-use super::case::Case;
 use crate::floors::ring::DEPTH;
 use crate::floors::vyukov::{QueueMemory, Vyukov};
 use crate::floors::{SlotMemory, SlotReceiver, SlotSender};
-use crate::harness::{
+use crate::one_way::{OwnNode, Retry, Sink, Source};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{
     Child, CycleCounter, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle,
 };
-use crate::one_way::{OwnNode, Retry, Sink, Source};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{OverflowPolicy, monotonic_ns};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

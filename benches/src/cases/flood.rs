@@ -9,13 +9,15 @@
 //! The flooder pauses for 2 ms in 20, so that the receiver sleeps now and then and the kernel's fair server stays out.
 //! Only what was sent while the mailbox was full counts: from before the send until it has been copied out.
 
-use super::case::Case;
 use crate::floors::ring::DEPTH;
 use crate::floors::{Queue, TwoRings, TwoRingsReceiver, TwoRingsSender};
-use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
 use crate::one_way::{OwnNode, QueueSink, Retry, Sink, Source};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{
+    Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle,
+};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{OverflowPolicy, monotonic_ns, sys};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

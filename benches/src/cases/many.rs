@@ -2,11 +2,12 @@
 //!
 //! Each turn makes its node anew, in a process of its own.
 
-use super::case::{Case, Done, as_failure};
-use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
+use super::errors::{Done, as_failure};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Shape, Type, monotonic_ns, node_directory};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

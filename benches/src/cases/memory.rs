@@ -1,11 +1,11 @@
 //! Shared memory that a mailbox takes, asked of the file system.
 
-use super::case::Case;
-use crate::harness::Failure;
 use crate::one_way::OwnNode;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::OverflowPolicy;
 use std::os::unix::fs::MetadataExt;
 

@@ -4,18 +4,18 @@
 //! between two marks, which are system calls themselves. Beside it stands a contender that is known to use what is
 //! counted.
 
-use super::case::Case;
 use crate::counting::heap_uses;
 use crate::floors::Queue;
-use crate::harness::{Failure, sample_in_child};
 use crate::one_way::{OwnNode, QueueSink, Retry, Sink, Source};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
 use nix::sys::ptrace;
 use nix::sys::signal::{Signal, kill, raise};
 use nix::sys::wait::{WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Failure, sample_in_child};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::OverflowPolicy;
 use std::hint::black_box;
 use std::sync::mpsc;

@@ -3,13 +3,13 @@
 //! A full mailbox rejects, and its sender tries again, so nothing is lost. The rings and queues beside it make
 //! their senders wait, too.
 
-use super::case::Case;
 use crate::floors::Queue;
 use crate::floors::ring::{BareRing, DEPTH, Futex, RingReceiver, RingSender, SharedRing as Ring};
-use crate::harness::{Failure, Scheduling, Shared};
 use crate::one_way::{OwnNode, QueueSink, Retry, Stream, rate};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Failure, Scheduling, Shared};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::OverflowPolicy;
 use std::time::Duration;
 
@@ -61,15 +61,12 @@ impl Case for OneSender {
         let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "packages/s" };
         let floor = if self.spins { bare } else { futex };
         let versus = [Versus { name: floor.name, p50: Some(Target::AtLeast(self.bound)), p99: None }];
-        #[allow(unused_mut)]
         let mut contenders = vec![ours, floor, queue];
-        #[cfg(feature = "peers")]
         contenders.extend(self.peers(&stream));
         Ok(compare(settings, &subject, &contenders, &versus))
     }
 }
 
-#[cfg(feature = "peers")]
 impl OneSender {
     fn peers<'a>(&self, stream: &'a Stream) -> Vec<Contender<'a>> {
         use crate::one_way::{channel_rate, iceoryx_rate};

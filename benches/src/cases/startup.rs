@@ -9,13 +9,14 @@
 //! hidden role, so that exec costs all the same; what they do after `main` has rows of its own. All have their
 //! defaults: a mailbox of `Shape::default()`, a queue of the kernel's default size.
 
-use super::case::{Case, Done, as_failure};
-use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use super::errors::{Done, as_failure};
 use nix::mqueue::{MQ_OFlag, MqAttr, MqdT, mq_close, mq_open, mq_send, mq_timedreceive, mq_unlink};
 use nix::sys::stat::Mode;
 use nix::sys::time::TimeSpec;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Receiver, Shape, Type, monotonic_ns, realtime_ns};
 use std::path::Path;
 use std::process::{Command, Stdio};

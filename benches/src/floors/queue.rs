@@ -1,10 +1,10 @@
 //! The kernel's own priority queue, POSIX `mq`: one in each direction.
 
-use crate::harness::{End, Failure, Link};
 use nix::mqueue::{MQ_OFlag, MqAttr, MqdT, mq_attr_member_t, mq_close, mq_open, mq_receive, mq_send, mq_unlink};
 use nix::sched::{CloneFlags, unshare};
 use nix::sys::resource::{RLIM_INFINITY, Resource, setrlimit};
 use nix::sys::stat::Mode;
+use rohrpost_bench_local::harness::{End, Failure, Link};
 use std::fs;
 use std::sync::Once;
 

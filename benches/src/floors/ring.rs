@@ -3,9 +3,9 @@
 //! It has no priorities, no second sender and no recovery from death. [`BareRing`] spins when it is empty or full,
 //! [`Futex`] sleeps.
 
-use crate::Failure;
-use crate::harness::Zeroable;
 use crate::one_way::{Sink, Source};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::Zeroable;
 use std::cell::UnsafeCell;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 

@@ -6,8 +6,8 @@
 //! senders, as a queue must that wakes, and never set.
 
 use super::ring::CacheLine;
-use crate::harness::{End, Failure, Link, Shared, Zeroable};
 use crate::one_way::{Sink, Source};
+use rohrpost_bench_local::harness::{End, Failure, Link, Shared, Zeroable};
 use std::cell::UnsafeCell;
 use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};

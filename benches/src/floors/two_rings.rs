@@ -2,9 +2,9 @@
 //! something urgent past a flood. It has exactly two priorities, and one sender for each.
 
 use super::ring::{Bell, RingMemory, RingReceiver, RingSender};
-use crate::Failure;
-use crate::harness::Zeroable;
 use crate::one_way::{Sink, Source};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::Zeroable;
 use std::sync::atomic::Ordering;
 
 /// Both rings' memory.

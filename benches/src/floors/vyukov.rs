@@ -6,9 +6,9 @@
 //! sender that dies with a number blocks it for ever.
 
 use super::ring::{BYTES_MAX, CacheLine, DEPTH};
-use crate::Failure;
-use crate::harness::Zeroable;
 use crate::one_way::{Sink, Source};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::Zeroable;
 use std::cell::UnsafeCell;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 

@@ -10,9 +10,11 @@
 
 use super::Wire;
 use super::udp::Datagrams;
-use crate::floors::{HandOver, Lanes, Wake};
-use crate::harness::{Cell, Child, End, Failure, Gate, Link, Meetings, Scratch, Shared, settle, time_two_processes};
-use crate::ours::Station;
+use rohrpost_bench_local::hand_over::{HandOver, Lanes, Wake};
+use rohrpost_bench_local::harness::{
+    Cell, Child, End, Failure, Gate, Link, Meetings, Scratch, Shared, settle, time_two_processes,
+};
+use rohrpost_bench_local::ours::Station;
 use rohrpost_mailbox::Name;
 use std::time::Instant;
 

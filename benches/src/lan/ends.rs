@@ -1,8 +1,8 @@
 //! Two modules on two nodes, by the public interface of mailboxes alone.
 
 use super::flow::{Inlet, LOOK, Outlet};
-use crate::Failure;
-use crate::harness::{Child, Link, Meetings};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, Link, Meetings};
 use rohrpost_mailbox::{
     Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };

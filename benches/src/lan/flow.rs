@@ -1,8 +1,8 @@
 //! Messages in one direction at the full rate, with losses allowed: received and lost messages are counted.
 
-use crate::Failure;
 use crate::floors::ring::Bell;
-use crate::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
 use rohrpost_mailbox::{monotonic_ns, sys};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

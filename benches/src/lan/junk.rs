@@ -1,6 +1,6 @@
 //! A sender of unwanted datagrams, as fast as a processor can send.
 
-use crate::harness::{Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle};
+use rohrpost_bench_local::harness::{Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle};
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

@@ -1,7 +1,7 @@
 //! Load that makes clocks and time slots hard to keep: busy processors, and a network full of foreign datagrams.
 
 use super::udp::Datagrams;
-use crate::harness::{Child, End, Failure, Link, Placement, Scheduling, settle};
+use rohrpost_bench_local::harness::{Child, End, Failure, Link, Placement, Scheduling, settle};
 use rohrpost_mailbox::monotonic_ns;
 use std::time::Duration;
 

@@ -7,8 +7,8 @@
 
 use super::flow::{Inlet, LOOK, Outlet, SILENCE, look_at};
 use super::router::SYSTEM;
-use crate::harness::{Child, Failure, Link};
 use crate::streams::{came, stamp, stream_failure};
+use rohrpost_bench_local::harness::{Child, Failure, Link};
 use rohrpost_mailbox::{
     Class, Name, Next, Node, Participant, Shape, StreamId, StreamReader, StreamShape, StreamWriter, Waiting,
 };

@@ -1,8 +1,8 @@
 //! One real router, as launch would start it: `rohrpost router`, at its node's place on the network.
 
-use crate::Failure;
-use crate::harness::Child;
 use nix::sys::signal::Signal;
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::Child;
 use rohrpost_mailbox::{Class, Name, Node, local, node_directory};
 use std::fs;
 use std::os::unix::process::CommandExt;

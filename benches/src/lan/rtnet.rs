@@ -8,9 +8,11 @@
 //! Both ends read the same clock, so any offset that the slave computes is its error.
 
 use super::wire::{Wire, address};
-use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
 use nix::sys::socket::{ControlMessageOwned, MsgFlags, SockaddrIn, recvmsg, setsockopt, sockopt};
 use nix::sys::time::TimeSpec;
+use rohrpost_bench_local::harness::{
+    Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle,
+};
 use rohrpost_mailbox::realtime_ns;
 use std::io::IoSliceMut;
 use std::net::{Ipv4Addr, UdpSocket};

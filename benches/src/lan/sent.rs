@@ -1,6 +1,6 @@
 //! What has left a node, as the kernel counts it at the node's device.
 
-use crate::Failure;
+use rohrpost_bench_local::Failure;
 use rohrpost_routers::lab::DEVICE;
 
 /// Devices of the namespace of the process that reads it.

@@ -1,6 +1,6 @@
 //! Nodes of one computer with clocks that are wrong on purpose, so that the true error of each is known.
 
-use crate::Failure;
+use rohrpost_bench_local::Failure;
 use rohrpost_mailbox::{TimeRecord, monotonic_ns};
 use rohrpost_routers::shell::clock::Skew;
 use std::time::Duration;

@@ -2,8 +2,8 @@
 
 use super::flow::{FILLER, Inlet, Outlet, look_at, put_ends};
 use super::wire::{Wire, address};
-use crate::harness::{End, Failure, Link};
 use nix::sys::socket::{setsockopt, sockopt};
+use rohrpost_bench_local::harness::{End, Failure, Link};
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! The network between the two ends of a case: a namespace for each, joined by a bridge.
 
-use crate::harness::{End, Failure};
+use rohrpost_bench_local::harness::{End, Failure};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec, become_able};
 use std::net::{IpAddr, Ipv4Addr};
 

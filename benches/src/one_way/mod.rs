@@ -1,17 +1,15 @@
 //! Messages in one direction: from one sender or several to one receiver, as fast as it takes them.
 
 mod ours;
-#[cfg(feature = "peers")]
 mod peers;
 mod queue;
 
 pub use ours::{OurSink, OurSource, OwnNode, Retry};
-#[cfg(feature = "peers")]
 pub use peers::{channel_rate, iceoryx_rate};
 pub use queue::QueueSink;
 
-use crate::Failure;
-use crate::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
 use rohrpost_mailbox::monotonic_ns;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -57,7 +55,7 @@ pub struct Stream {
     pub senders: usize,
     /// How all are scheduled.
     pub scheduling: Scheduling,
-    /// Ends the turn with what was sent by then; see [`crate::harness::Cell::cap`].
+    /// Ends the turn with what was sent by then; see [`rohrpost_bench_local::harness::Cell::cap`].
     pub cap: Duration,
 }
 

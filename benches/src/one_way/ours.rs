@@ -1,8 +1,8 @@
 //! Rohrpost's mailboxes, one way.
 
 use super::{Sink, Source};
-use crate::Failure;
-use crate::harness::Scratch;
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::Scratch;
 use rohrpost_mailbox::{
     Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };

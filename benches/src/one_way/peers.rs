@@ -1,10 +1,10 @@
 //! iceoryx2 between processes and crossbeam's channel between threads, one way.
 
 use super::{Sink, Source, Stream, StreamTurn, receive_all, send_all};
-use crate::Failure;
-use crate::harness::{Child, End, Placement, Scratch, Shared, settle};
 use crate::peers::{IceoryxReceiver, IceoryxSender};
 use crossbeam_channel::{Receiver, Sender, bounded};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, End, Placement, Scratch, Shared, settle};
 use std::time::Instant;
 
 /// How many messages wait at most.

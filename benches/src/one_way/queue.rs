@@ -1,8 +1,8 @@
 //! A POSIX queue, one way. Its sender sleeps in the kernel while it is full, the receiver while it is empty.
 
 use super::{Sink, Source};
-use crate::Failure;
 use crate::floors::Queue;
+use rohrpost_bench_local::Failure;
 
 /// Sends into a queue with one priority.
 pub struct QueueSink<'a> {

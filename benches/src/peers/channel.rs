@@ -1,7 +1,7 @@
 //! crossbeam's channel between two threads of one process: no shared memory, no dead peers, no priorities.
 
-use crate::harness::{Failure, Link};
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
+use rohrpost_bench_local::harness::{Failure, Link};
 
 /// Messages that may wait; in ping-pong more than one never does.
 const DEPTH: usize = 64;

@@ -1,9 +1,9 @@
 //! iceoryx2: publish and subscribe between two processes.
 
-use crate::harness::{End, Failure, Link, Meetings, Scratch};
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
 use iceoryx2::port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::*;
+use rohrpost_bench_local::harness::{End, Failure, Link, Meetings, Scratch};
 use std::fmt::Debug;
 
 pub(super) type Service = ipc::Service;

@@ -2,10 +2,10 @@
 //! sleep.
 
 use super::iceoryx::{Service, configuration, events, failed, messages};
-use crate::harness::{Failure, Scratch};
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
 use iceoryx2::port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::*;
+use rohrpost_bench_local::harness::{Failure, Scratch};
 
 const SERVICE: &str = "stream";
 

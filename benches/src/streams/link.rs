@@ -1,8 +1,8 @@
 //! A stream in each direction, for ping-pong.
 
 use super::node::{came, stamp, stream_failure};
-use crate::harness::{End, Failure, Link, Meetings};
-use crate::ours::How;
+use rohrpost_bench_local::harness::{End, Failure, Link, Meetings};
+use rohrpost_bench_local::ours::How;
 use rohrpost_mailbox::{Name, Node, Participant, StreamId, StreamReader, StreamShape, StreamWriter, Waiting};
 use std::path::Path;
 use std::time::Duration;

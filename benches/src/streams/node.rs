@@ -1,6 +1,6 @@
 //! A node with one stream, and what its readers and writer say.
 
-use crate::harness::{Failure, Scratch};
+use rohrpost_bench_local::harness::{Failure, Scratch};
 use rohrpost_mailbox::{
     Name, Next, Node, Participant, Stamp, StreamError, StreamId, StreamReader, StreamShape, StreamWriter,
 };

@@ -4,10 +4,10 @@
 //! a rate with losses to one without; so here the reader tells how far it is, in a word that is not of the stream.
 
 use super::node::{StreamNode, came, stamp};
-use crate::Failure;
 use crate::floors::ring::CacheLine;
-use crate::harness::Zeroable;
 use crate::one_way::{Sink, Source};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::Zeroable;
 use rohrpost_mailbox::{StreamReader, StreamWriter, Waiting};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;

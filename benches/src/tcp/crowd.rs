@@ -8,10 +8,10 @@ use super::pace::{Pace, ticks};
 use super::stalled::Stalled;
 use super::systems::{Systems, guest};
 use super::tally::Tally;
-use crate::harness::{Child, End, Failure, Placement, Scheduling, Shared, interrupted, settle};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use nix::sys::timerfd::TimerFd;
+use rohrpost_bench_local::harness::{Child, End, Failure, Placement, Scheduling, Shared, interrupted, settle};
 use rohrpost_mailbox::monotonic_ns;
 use std::time::{Duration, Instant};
 

@@ -1,9 +1,9 @@
 //! The link between a relay and its module: takes what the module sends, and hands over what arrives for it.
 
-use crate::floors::{HandOver, Lanes, Wake};
-use crate::harness::{End, Failure, Link, Shared};
-use crate::ours::Station;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use rohrpost_bench_local::hand_over::{HandOver, Lanes, Wake};
+use rohrpost_bench_local::harness::{End, Failure, Link, Shared};
+use rohrpost_bench_local::ours::Station;
 use rohrpost_mailbox::{Interest, Name, Node, Participant, Receiver, Shape, Waiting, Watches};
 use std::fs::File;
 use std::io::{Read, Write};

@@ -2,8 +2,8 @@
 
 use super::systems::{guest, system_of};
 use super::tally::Tally;
-use crate::harness::{End, Failure};
 use nix::sys::epoll::{Epoll, EpollEvent, EpollFlags};
+use rohrpost_bench_local::harness::{End, Failure};
 use rohrpost_mailbox::{Head, Name, Options, Priority, Type, monotonic_ns};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;

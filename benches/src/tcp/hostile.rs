@@ -1,8 +1,8 @@
 //! Hostile programs: connections with garbage, and some that send a hello a byte at a time.
 
 use super::tally::Tally;
-use crate::harness::{Child, Failure, Shared};
 use nix::sys::socket::{AddressFamily, SockFlag, SockType, SockaddrIn, bind, connect, setsockopt, socket, sockopt};
+use rohrpost_bench_local::harness::{Child, Failure, Shared};
 use rohrpost_routers::session::frame::{SessionHello, SessionMessage};
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};

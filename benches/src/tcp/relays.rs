@@ -9,8 +9,10 @@
 
 use super::door::{Door, Hall, MailboxDoor};
 use super::systems::free_address;
-use crate::harness::{Cell, Child, End, Failure, Gate, Link, Scratch, Shared, settle, time_two_processes};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
+use rohrpost_bench_local::harness::{
+    Cell, Child, End, Failure, Gate, Link, Scratch, Shared, settle, time_two_processes,
+};
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::{Duration, Instant};

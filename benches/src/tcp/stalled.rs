@@ -1,8 +1,8 @@
 //! A session that sends keep-alives, receives packages, and reads none.
 
 use super::pace::Pace;
-use crate::harness::Failure;
 use nix::sys::socket::{setsockopt, sockopt};
+use rohrpost_bench_local::harness::Failure;
 use rohrpost_routers::session::frame::SessionMessage;
 use rohrpost_routers::tcp::{Moved, Stream};
 

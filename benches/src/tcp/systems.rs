@@ -1,8 +1,8 @@
 //! Two systems that meet at a TCP router, each a single node: real processes, as launch would start them.
 
-use crate::Failure;
-use crate::harness::{Child, End, Placement, Scheduling, Scratch, interrupted, settle};
-use crate::settings::Settings;
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, End, Placement, Scheduling, Scratch, interrupted, settle};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Class, Name, node_directory};
 use rohrpost_routers::tcp::{ClientSeal, Holder};

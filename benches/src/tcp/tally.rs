@@ -1,6 +1,6 @@
 //! Counts of a crowd, visible to its parent.
 
-use crate::harness::{Samples, Zeroable};
+use rohrpost_bench_local::harness::{Samples, Zeroable};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Counts of one turn. One process writes each of them.

@@ -2,7 +2,7 @@
 //! only compiled on demand.
 
 use super::systems::free_address;
-use crate::harness::{Cell, Child, Failure, Scratch, interrupted};
+use rohrpost_bench_local::harness::{Cell, Child, Failure, Scratch, interrupted};
 use std::fs::{self, File};
 use std::net::{SocketAddr, TcpStream};
 use std::os::unix::process::CommandExt;

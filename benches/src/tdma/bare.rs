@@ -6,8 +6,8 @@
 
 use super::plan::Plan;
 use super::stage::{NODES, Stage};
-use crate::Failure;
-use crate::harness::{Child, Gate, Samples, Shared, rest};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, Gate, Samples, Shared, rest};
 use rohrpost_mailbox::{monotonic_ns, sys};
 use rohrpost_routers::driver::spin_ns;
 use rohrpost_routers::tdma::{GATE_NS, Window, WindowKind};

@@ -3,8 +3,8 @@
 use super::filter;
 use super::plan::PORT;
 use super::stage::Stage;
-use crate::Failure;
-use crate::harness::{Child, Gate, Shared, Zeroable};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable};
 use rohrpost_mailbox::{Name, Type};
 use rohrpost_routers::frame::Frame;
 use rohrpost_routers::lab;

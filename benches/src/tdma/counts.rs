@@ -1,7 +1,7 @@
 //! What routers report of their slots, by `rohrpost net`, as for a user.
 
 use super::stage::{NODES, Place};
-use crate::harness::{Failure, interrupted};
+use rohrpost_bench_local::harness::{Failure, interrupted};
 use serde::Deserialize;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

@@ -1,8 +1,8 @@
 //! A packet socket that receives only datagrams of routers: a flood beside them is not copied.
 
-use crate::Failure;
 use libc::{BPF_ABS, BPF_B, BPF_H, BPF_JEQ, BPF_JMP, BPF_K, BPF_LD, BPF_RET, sock_filter, sock_fprog};
 use nix::sys::socket::{AddressFamily, SockFlag, SockProtocol, SockType, setsockopt, socket, sockopt};
+use rohrpost_bench_local::Failure;
 use std::io;
 use std::os::fd::{AsRawFd, OwnedFd};
 

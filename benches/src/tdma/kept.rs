@@ -2,7 +2,7 @@
 
 use super::capture::{Crossed, FrameKind};
 use super::stage::NODES;
-use crate::statistics::median;
+use rohrpost_bench_local::statistics::median;
 use rohrpost_mailbox::TimeRecord;
 use rohrpost_routers::tdma::{SlotTable, Window, WindowKind};
 

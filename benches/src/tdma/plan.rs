@@ -1,9 +1,9 @@
 //! The slot tables, and their configuration.
 
 use super::stage::{NODES, Place};
-use crate::Failure;
 use crate::lan::records::{self, RECORDS};
 use crate::lan::router::{ROUTER, SYSTEM};
+use rohrpost_bench_local::Failure;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Class, Name, StreamShape};
 use rohrpost_routers::settings::Settings;

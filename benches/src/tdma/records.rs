@@ -3,10 +3,10 @@
 use super::plan::replica_of;
 use super::routers::Routers;
 use super::stage::NODES;
-use crate::Failure;
-use crate::harness::{Child, Gate, Shared, Zeroable};
 use crate::lan::flow::{FILLER, Inlet, Outlet, checked, put_number};
 use crate::lan::records::{self, RecordInlet, RecordOutlet};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable};
 use rohrpost_mailbox::StreamShape;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

@@ -1,7 +1,7 @@
 //! Scheduling that the routers' process may ask the kernel for.
 
-use crate::Failure;
 use nix::sys::resource::{Resource, setrlimit};
+use rohrpost_bench_local::Failure;
 use std::io;
 
 /// How a router may be scheduled.

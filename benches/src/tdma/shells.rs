@@ -3,10 +3,10 @@
 
 use super::plan::Plan;
 use super::stage::{NODES, Place, Stage};
-use crate::Failure;
-use crate::harness::Scratch;
 use crate::lan::router::{ROUTER, SYSTEM};
 use crate::lan::skewed::{SKEW, Shown};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::Scratch;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, monotonic_ns, realtime_ns};
 use rohrpost_routers::settings::Settings;

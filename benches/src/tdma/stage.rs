@@ -1,10 +1,10 @@
 //! The network: a namespace for each node and for two bystanders, joined by a bridge.
 
-use crate::Failure;
 use crate::lan::junk::Junk;
 use crate::lan::load::Load;
 use crate::lan::udp::Datagrams;
 use crate::lan::wire::failure;
+use rohrpost_bench_local::Failure;
 use rohrpost_routers::lab::{Lab, NodeSpec};
 use std::net::{IpAddr, Ipv4Addr};
 

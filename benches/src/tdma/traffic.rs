@@ -4,9 +4,9 @@
 use super::plan::flood;
 use super::routers::Routers;
 use super::stage::NODES;
-use crate::Failure;
-use crate::harness::{Child, Gate, Shared};
 use crate::lan::ends::{LanSink, LanSource};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Child, Gate, Shared};
 use std::time::Duration;
 
 /// Fills a datagram of 1500 bytes, all heads counted.

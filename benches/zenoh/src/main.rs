@@ -8,8 +8,8 @@
 //! ```
 //! The pong answers from its callback, the ping reads from the default channel, as in zenoh's own examples.
 
-use rohrpost_bench::Failure;
-use rohrpost_bench::harness::{Cell, End, Link, Placement, Scheduling, ping, settle};
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::harness::{Cell, End, Link, Placement, Scheduling, ping, settle};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use zenoh::handlers::FifoChannelHandler;

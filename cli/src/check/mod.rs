@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let only = arguments.node.as_deref();
     if only.is_some() {
-        rohrpost::launch::choose_node(&installation, only)?;
+        rohrpost_launch::choose_node(&installation, only)?;
     }
     let missing = missing_programs(&installation, only)?;
     let mut notes = separated_by_size(&installation);

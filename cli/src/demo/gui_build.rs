@@ -1,9 +1,9 @@
 //! How far the build of the GUI bridge is that `cargo demo` runs beside the demo.
 
 use super::copy::is_gui;
-use rohrpost::launch::Launch;
-use rohrpost::launcher::Phase;
 use rohrpost::output::plain;
+use rohrpost_launch::Launch;
+use rohrpost_launch::launcher::Phase;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;

@@ -19,10 +19,10 @@ use rohrpost::interface::{DataPort, Interface};
 use rohrpost::interfaces::{
     CartographerInterface, FlowStates, Links, MapCounts, ReplicaStates, RouterInterface, SlotState,
 };
-use rohrpost::survey::Survey;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, ToolLink};
 use rohrpost_config::Installation;
+use rohrpost_launch::survey::Survey;
 use rohrpost_mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
 use serde::de::DeserializeOwned;
 use std::process::ExitCode;

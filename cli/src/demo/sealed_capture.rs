@@ -1,9 +1,9 @@
 //! Decodes sealed time datagrams from the bridge: the demo has the keys, and reads them like a node that has not
 //! authenticated its peers.
 
-use crate::router::keys;
 use crate::terminal::Failure;
 use rohrpost_config::Installation;
+use rohrpost_router_daemon::keys;
 use rohrpost_routers::frame::FrameHead;
 use rohrpost_routers::security::{Opening, PeerSessions, Port, RouterIdentity, TAG_BYTES};
 use rohrpost_routers::settings::Settings;

@@ -16,7 +16,7 @@ use finding::{Finding, Grade};
 pub(super) use machine::room_of_nodes;
 use machine::{Machine, Needs};
 use protection::Protection;
-use rohrpost::launch::choose_node;
+use rohrpost_launch::choose_node;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

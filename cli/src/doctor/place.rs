@@ -3,7 +3,7 @@
 use super::finding::{Finding, Grade};
 use super::machine::{Bridge, Machine, Needs, NodeDirectory, StreamsFound};
 use crate::units::{date, size};
-use rohrpost::launch::clock_was_set;
+use rohrpost_modules::runtime::clock_was_set;
 use std::path::Path;
 
 /// Room for tools, for mailboxes that modules create at run time, and for streams that the configuration does not name,

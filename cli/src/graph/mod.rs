@@ -15,7 +15,7 @@ use crate::terminal::{Failure, say};
 use crate::whole_file::write_whole;
 use parts::{Carries, Edge, Graph, Module};
 use rohrpost::Name;
-use rohrpost::survey::{Scope, StreamSurvey, Survey, is_hop};
+use rohrpost_launch::survey::{Scope, StreamSurvey, Survey, is_hop};
 use rohrpost_mailbox::{FlowInfo, Kind, StreamId};
 use std::path::PathBuf;
 use std::process::ExitCode;

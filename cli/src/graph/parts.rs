@@ -2,7 +2,7 @@
 
 use crate::observer::Silence;
 use rohrpost::output::plain;
-use rohrpost::survey::Standing;
+use rohrpost_launch::survey::Standing;
 use serde::Serialize;
 
 /// Modules and the edges between them.

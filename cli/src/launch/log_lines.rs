@@ -6,9 +6,9 @@ use rohrpost::Name;
 use rohrpost::common::OutputLevel;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CollectorInterface, Page};
-use rohrpost::launch::Launch;
 use rohrpost_builtin::format::Format;
 use rohrpost_config::Installation;
+use rohrpost_launch::Launch;
 use std::time::{Duration, Instant};
 
 /// New lines are asked for so often.

@@ -22,7 +22,6 @@ mod sampler;
 mod tap;
 mod taps;
 
-use crate::router::NoSettings;
 use crate::version;
 use control::{ControlServer, Orders, Told};
 use earlier::EarlierFiles;
@@ -32,6 +31,7 @@ use rohrpost::output::errno_of;
 use rohrpost::{Context, Module, ModuleClock, ModuleError, Ready, Received, Start, StartError};
 use rohrpost_config::{Installation, Recording};
 use rohrpost_mailbox::TimeSource;
+use rohrpost_modules::NoSettings;
 use rohrpost_recording::{
     ControlAnswer, ControlCommand, DrawnBeside, Earlier, LossCause, Losses, Options, Rotation, Session, Status, Writer,
 };

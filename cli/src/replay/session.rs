@@ -6,9 +6,9 @@ use crate::speech::Speech;
 use crate::terminal::Failure;
 use crate::units::short;
 use rohrpost::interfaces::{ReplayInterface, ReplayPosition};
-use rohrpost::launch::Launch;
 use rohrpost::wire::from_bytes;
 use rohrpost::{CallError, Name};
+use rohrpost_launch::Launch;
 use std::time::{Duration, Instant};
 
 /// Functions of the player that are called, by their numbers.

@@ -7,7 +7,7 @@ use rohrpost::common::DataHead;
 use rohrpost::description::noted;
 use rohrpost::output::plain;
 use rohrpost::schema::{DataItem, DataKind, Description};
-use rohrpost::survey::Scope;
+use rohrpost_launch::survey::Scope;
 use rohrpost_mailbox::{BODY_BYTES_MAX, StreamError, StreamId, StreamInfo};
 
 #[derive(clap::Args)]

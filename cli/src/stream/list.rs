@@ -6,7 +6,7 @@ use crate::list::{NodeLine, node_lines};
 use crate::observer::Silence;
 use crate::target::{Running, Target};
 use crate::terminal::{Failure, say, say_folded};
-use rohrpost::survey::{Scope, StreamSurvey};
+use rohrpost_launch::survey::{Scope, StreamSurvey};
 use rohrpost_mailbox::monotonic_ns;
 use serde::Serialize;
 use std::process::ExitCode;

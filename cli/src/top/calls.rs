@@ -6,10 +6,10 @@ use super::super::target::Running;
 use rohrpost::CallError;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
-use rohrpost::launcher::{ControlError, SnapshotRequest, launcher_of};
-use rohrpost::survey::{Distant, Scope, Snapshot, Survey};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Name, ToolLink};
+use rohrpost_launch::launcher::{AskLaunch, ControlError, SnapshotRequest, launcher_of};
+use rohrpost_launch::survey::{Distant, Scope, Snapshot, Survey};
 use std::time::Duration;
 
 /// Timeout for an answer.

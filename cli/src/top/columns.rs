@@ -3,7 +3,7 @@
 use super::super::units;
 use super::model::Row;
 use rohrpost::output::plain;
-use rohrpost::survey::Standing;
+use rohrpost_launch::survey::Standing;
 use std::cmp::Ordering;
 
 /// What a column shows of a module.

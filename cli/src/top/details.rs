@@ -9,8 +9,8 @@ use super::model::{FlowEnd, Model, Row, Sample};
 use rohrpost::Name;
 use rohrpost::output::plain;
 use rohrpost::schema::{Description, describe_field, describe_result};
-use rohrpost::survey::{StreamSurvey, sum};
 use rohrpost_config::{Installation, Program};
+use rohrpost_launch::survey::{StreamSurvey, sum};
 use rohrpost_mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
 use std::time::Duration;
 

@@ -27,7 +27,7 @@ use super::target::{Running, Target};
 use crate::terminal::{Failure, say};
 use model::Model;
 use rohrpost::Name;
-use rohrpost::survey::Scope;
+use rohrpost_launch::survey::Scope;
 use sample::ErrorCauses;
 use std::io::IsTerminal;
 use std::process::ExitCode;

@@ -4,7 +4,7 @@ use super::columns::Column;
 use super::model::Row;
 use ratatui::style::{Color, Modifier, Style};
 use rohrpost::common::OutputLevel;
-use rohrpost::survey::Standing;
+use rohrpost_launch::survey::Standing;
 
 /// With or without colours.
 #[derive(Clone, Copy)]

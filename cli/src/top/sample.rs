@@ -6,7 +6,7 @@ use super::super::target::Running;
 use super::model::{Sample, TimeNow};
 use crate::terminal::Failure;
 use rohrpost::Name;
-use rohrpost::survey::{Scope, Standing, Survey};
+use rohrpost_launch::survey::{Scope, Standing, Survey};
 use rohrpost_mailbox::{SystemClock, monotonic_ns, realtime_ns};
 use std::collections::HashMap;
 

@@ -4,8 +4,8 @@ use super::super::table;
 use super::super::units::date;
 use super::columns::{Column, short};
 use super::model::{Model, TimeNow};
-use rohrpost::launch::clock_was_set;
-use rohrpost::survey::Standing;
+use rohrpost_launch::survey::Standing;
+use rohrpost_modules::runtime::clock_was_set;
 
 /// The whole output as plain text, for `--once`.
 pub(super) fn table(model: &Model) -> String {

@@ -17,16 +17,14 @@ mod errno;
 mod layer;
 mod out;
 mod print;
-mod relay;
+pub(crate) mod relay;
 mod said;
-mod trace;
+pub(crate) mod trace;
 mod way;
 
 pub use errno::{errno_of, errno_text};
 pub(crate) use print::print;
-pub(crate) use relay::{OutputProxy, Relay, WeakOutputProxy};
 pub use rohrpost_schema::plain;
-pub(crate) use trace::LINES_MAX as TRACE_LINES_MAX;
 pub(crate) use way::install_quiet;
 pub(crate) use way::is_installed;
 pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppressed};
@@ -46,10 +44,12 @@ pub const TEXT_MAX: usize = 900;
 
 /// Begins each line that a launched module prints although it has sent it, too: launch repeats it, and does not send it
 /// again.
-pub(crate) const SENT: char = '\u{1e}';
+#[doc(hidden)]
+pub const SENT: char = '\u{1e}';
 /// Begins each line that says where a panic came from, of a launched module: launch tells it once, and does not send
 /// it.
-pub(crate) const TRACED: char = '\u{1d}';
+#[doc(hidden)]
+pub const TRACED: char = '\u{1d}';
 
 /// One line of output.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]

@@ -12,7 +12,7 @@ use std::sync::{Arc, Weak};
 use std::time::Instant;
 
 /// The way to the collector, shared by all modules for which this process speaks.
-pub(crate) struct Relay {
+pub struct Relay {
     participant: Arc<Participant>,
     /// Launch's own name, under which it sends.
     from: Name,
@@ -20,18 +20,19 @@ pub(crate) struct Relay {
 }
 
 /// Speaks for one module, within the same allowance as the module has itself.
-pub(crate) struct OutputProxy(Arc<Output>);
+pub struct OutputProxy(Arc<Output>);
 
-/// The same for a thread that nobody waits for: silent when all else has ended.
-pub(crate) struct WeakOutputProxy(Weak<Output>);
+/// Speaks for one module as [`OutputProxy`] does, for a thread that nobody waits for: silent when all else has ended.
+pub struct WeakOutputProxy(Weak<Output>);
 
 impl Relay {
-    pub(crate) fn new(participant: &Arc<Participant>, from: Name) -> Self {
+    /// Sends under the name `from`.
+    pub fn new(participant: &Arc<Participant>, from: Name) -> Self {
         Self { participant: participant.clone(), from, out: Arc::default() }
     }
 
-    /// None: the configuration knows no collector.
-    pub(crate) fn voice(&self, installation: &Installation, module: Name) -> Option<OutputProxy> {
+    /// Speaks for a module. None: the configuration knows no collector.
+    pub fn voice(&self, installation: &Installation, module: Name) -> Option<OutputProxy> {
         let output = Output::new(&self.participant, installation, module, self.from, self.out.clone(), Print::Nothing)?;
         Some(OutputProxy(Arc::new(output)))
     }
@@ -40,34 +41,36 @@ impl Relay {
 impl OutputProxy {
     /// Says a line as of this system time, unless the module says too much already, or its configuration wants to hear
     /// only of more important things.
-    pub(crate) fn say(&self, level: OutputLevel, time_ns: u64, text: String, errno: Option<u16>) {
+    pub fn say(&self, level: OutputLevel, time_ns: u64, text: String, errno: Option<u16>) {
         if level <= self.0.level() && self.0.allows(Lane::of(level)) {
             self.0.say(level, time_ns, Said { text: cut(text), errno });
         }
     }
 
     /// System time, as lines carry it.
-    pub(crate) fn now_ns(&self) -> u64 {
+    pub fn now_ns(&self) -> u64 {
         self.0.now_ns()
     }
 
     /// Sends what waits, and tells of what was suppressed when it is time.
-    pub(crate) fn attend(&self) {
+    pub fn attend(&self) {
         self.0.attend();
     }
 
     /// When to attend to it again.
-    pub(crate) fn retry_at(&self) -> Option<Instant> {
+    pub fn retry_at(&self) -> Option<Instant> {
         self.0.retry_at()
     }
 
-    pub(crate) fn whisper(&self) -> WeakOutputProxy {
+    /// For a thread that nobody waits for.
+    pub fn whisper(&self) -> WeakOutputProxy {
         WeakOutputProxy(Arc::downgrade(&self.0))
     }
 }
 
 impl WeakOutputProxy {
-    pub(crate) fn voice(&self) -> Option<OutputProxy> {
+    /// None when all else has ended.
+    pub fn voice(&self) -> Option<OutputProxy> {
         self.0.upgrade().map(OutputProxy)
     }
 }

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 /// Lines that are printed at most.
-pub(crate) const LINES_MAX: usize = 40;
+pub const LINES_MAX: usize = 40;
 /// How names of functions begin that are nobody's own.
 const OTHERS: [&str; 15] = [
     "std::",

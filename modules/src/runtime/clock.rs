@@ -88,3 +88,18 @@ fn recorded(
     let source = SOURCES.into_iter().find(|known| *known as u8 == source)?;
     Some(TimeRecord { epoch, source, monotonic_ns, system_ns, pace_ppb, error_ns, drift_ns_s })
 }
+
+/// What a computer's clock that was set is called.
+///
+/// ```
+/// use rohrpost_modules::runtime::clock_was_set;
+///
+/// let days = |days: i64| clock_was_set(days * 86_400_000_000_000);
+/// assert_eq!(days(2), "this computer's clock is 2.0 days ahead of system time");
+/// assert_eq!(days(-400), "this computer's clock is 400 days behind system time");
+/// ```
+pub fn clock_was_set(by_ns: i64) -> String {
+    let (days, side) = (by_ns.unsigned_abs() as f64 / 86_400e9, if by_ns < 0 { "behind" } else { "ahead of" });
+    let digits = usize::from(days < 100.0);
+    format!("this computer's clock is {days:.digits$} days {side} system time")
+}

@@ -96,7 +96,10 @@ impl ToolLink {
     }
 
     /// Joins as the launch of a node: under the first instance, where tools look for it.
-    pub(crate) fn join_as_launch(
+    ///
+    /// # Errors
+    /// See [`ClientError`]; [`CreateError::Owned`] while a launch of it runs.
+    pub fn join_as_launch(
         installation: &Installation,
         node: &Arc<Node>,
         name: &str,
@@ -118,10 +121,11 @@ impl ToolLink {
     /// Where the launch of this node takes commands, if one runs.
     ///
     /// ```
-    /// # use rohrpost_modules::{call::CallError, runtime::ToolLink};
-    /// fn modules(tool: &mut ToolLink) -> Result<usize, CallError> {
+    /// # use rohrpost_modules::{call::CallError, runtime::ToolLink, schema::Description};
+    /// # use std::time::Duration;
+    /// fn what_launch_offers(tool: &mut ToolLink) -> Result<Description, CallError> {
     ///     let launcher = tool.launcher();
-    ///     Ok(tool.children(launcher)?.len())
+    ///     rohrpost_modules::runtime::describe(&mut tool.link, launcher, Duration::from_secs(1))
     /// }
     /// ```
     pub fn launcher(&self) -> Name {

@@ -1,14 +1,14 @@
 //! A module and the state it is in.
 
 use super::context::Context;
+use super::work::{in_words, work_of};
 use crate::call::Fault;
 use crate::common::Status;
 use crate::journal::{JournalEvent, Tag};
 use crate::made::{CommandFailure, MadeModule};
 use crate::module::ModuleError;
 use crate::output;
-use crate::survey::in_words;
-use rohrpost_mailbox::{ModuleState, Participant, Work};
+use rohrpost_mailbox::{ModuleState, Participant};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -167,19 +167,5 @@ impl<M: MadeModule> Incarnation<M> {
             output_level: output::level(),
             refused: context.refusals.counts,
         }
-    }
-}
-
-/// What tools see of it.
-fn work_of(event: &JournalEvent<'_>) -> Work {
-    match *event {
-        JournalEvent::New => Work::New,
-        JournalEvent::On => Work::On,
-        JournalEvent::Off => Work::Off,
-        JournalEvent::Tick => Work::Tick,
-        JournalEvent::Received { number, .. } => Work::Received(number),
-        JournalEvent::Function { number, .. } => Work::Function(number),
-        JournalEvent::Parameters { .. } => Work::Parameters,
-        JournalEvent::Ready { .. } => Work::Ready,
     }
 }

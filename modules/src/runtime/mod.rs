@@ -27,14 +27,15 @@ mod run;
 mod runner;
 pub(crate) mod schedule;
 pub(crate) mod server;
-mod start;
+pub(crate) mod start;
 mod stream;
 mod subscribed;
 mod time_teller;
 mod unreadable;
 mod wanted;
+pub(crate) mod work;
 
-pub use clock::ModuleClock;
+pub use clock::{ModuleClock, clock_was_set};
 pub use context::Context;
 pub(crate) use error::is_misconfigured;
 pub use error::{ContextError, StartError};
@@ -44,7 +45,6 @@ pub use received::Received;
 pub use run::{exit, run, run_described, run_started, tell_exit};
 pub use server::{read_arguments, write_result};
 pub use start::{Start, find_running, find_unusable, kept};
-pub(crate) use start::{environment, stop_signals};
 pub use stream::{
     Moment, OpenValue, Record, RecordError, StayingBytes, Stream, StreamReadError, StreamSubscription, SuspendedValue,
 };

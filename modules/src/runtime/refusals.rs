@@ -9,7 +9,7 @@ const TELL_EVERY_NS: u64 = 10_000_000_000;
 
 /// Why a package is not taken.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Cause {
+pub enum Cause {
     /// `[access]` does not let the sender's class command this one.
     NotAllowed,
     /// The sender holds its share of places, or all are taken.
@@ -53,14 +53,14 @@ impl Cause {
 
 /// All refusals of one incarnation.
 #[derive(Default)]
-pub(crate) struct Refusals {
+pub struct Refusals {
     pub(crate) counts: Refused,
     throttle: Throttle,
 }
 
 impl Refusals {
     /// Counts one.
-    pub(crate) fn note(&mut self, cause: Cause, from: Name) {
+    pub fn note(&mut self, cause: Cause, from: Name) {
         let count = self.count(cause).map(|count| *count += 1);
         let Some(words) = cause.words() else { return };
         if let Some(packages) = self.throttle.note(monotonic_ns(), TELL_EVERY_NS) {

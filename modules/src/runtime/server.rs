@@ -8,22 +8,32 @@ use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{Head, Kind, Label, Name, Options, Package, Receiver, SendError, Type, local, monotonic_ns};
 
 /// Runs the commands of a mailbox: a module under one of its names, or launch.
-pub(crate) trait CommandHandler {
+pub trait CommandHandler {
     /// Whether a function may be run twice without harm.
     fn is_idempotent(&self, number: u16) -> bool;
     /// Runs a command; what it has to say is appended to the reply.
+    ///
+    /// # Errors
+    /// What the caller is told instead.
     fn run(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault>;
     /// The principal that is charged for a command, unless its sender may not command at all.
+    ///
+    /// # Errors
+    /// What such a sender is told.
     fn admit(&self, head: &Head) -> Result<Principal, Fault>;
     /// Counts what is not taken.
     fn refuse(&mut self, cause: Cause, from: Name);
     /// Sends an answer.
+    ///
+    /// # Errors
+    /// When it cannot be sent.
     fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError>;
 }
 
 /// A command mailbox, and what was run of what came there.
-pub(crate) struct CommandServer {
-    pub(crate) commands: Receiver,
+pub struct CommandServer {
+    /// Mailbox in which commands arrive.
+    pub commands: Receiver,
     deduplicator: Deduplicator,
     /// The result being written; kept, so that answering allocates nothing.
     reply: Vec<u8>,
@@ -32,12 +42,12 @@ pub(crate) struct CommandServer {
 impl CommandServer {
     /// The previous owner of this mailbox has ended by now, and ran nothing after this. These principals always find a
     /// place.
-    pub(crate) fn new(commands: Receiver, named: &[Principal]) -> Self {
+    pub fn new(commands: Receiver, named: &[Principal]) -> Self {
         Self { commands, deduplicator: Deduplicator::new(monotonic_ns(), named), reply: Vec::with_capacity(1024) }
     }
 
     /// Handles the next command; false when there is none.
-    pub(crate) fn handle(&mut self, handler: &mut impl CommandHandler) -> bool {
+    pub fn handle(&mut self, handler: &mut impl CommandHandler) -> bool {
         let Some(package) = self.commands.try_receive() else { return false };
         let head = *package.head();
         let (Kind::Command(number), Ok((envelope, arguments))) =
@@ -91,7 +101,10 @@ impl CommandServer {
 
 /// Validates the sender of a command by `[access]`, and says which principal's share of places it uses. The routers
 /// have validated by the same rules what comes from other nodes; here it holds for what comes from the same one, too.
-pub(crate) fn admit(installation: &Installation, head: &Head) -> Result<Principal, Fault> {
+///
+/// # Errors
+/// [`Fault::NotAllowed`]
+pub fn admit(installation: &Installation, head: &Head) -> Result<Principal, Fault> {
     let Some(rule) = installation.access_against(head.from, head.to) else {
         return Ok(installation.principal(head.from));
     };
@@ -161,19 +174,24 @@ fn answer(
 }
 
 /// A command that is to be run.
-pub(crate) struct Command<'a> {
-    pub(crate) number: u16,
+pub struct Command<'a> {
+    /// Number of the function that is called.
+    pub number: u16,
     pub(crate) head: Head,
     /// Hash of the interface that the caller knows.
     hash: u32,
     /// The caller's.
     pub(crate) incarnation: u32,
-    pub(crate) arguments: &'a [u8],
+    /// Arguments: postcard of a tuple.
+    pub arguments: &'a [u8],
 }
 
 impl Command<'_> {
     /// The caller knows the interface that is served here; common functions are of none.
-    pub(crate) fn require_interface(&self, own: u32) -> Result<(), Fault> {
+    ///
+    /// # Errors
+    /// [`Fault::InterfaceDiffers`]
+    pub fn require_interface(&self, own: u32) -> Result<(), Fault> {
         let of_interface =
             self.number >= common::FIRST_OWN || matches!(self.number, common::GET_DATA | common::SUBSCRIBE);
         let server = if of_interface { own } else { common::HASH };
@@ -181,7 +199,10 @@ impl Command<'_> {
     }
 
     /// The part that was asked for of the bytes of a description.
-    pub(crate) fn describe(&self, description: &[u8], reply: &mut Vec<u8>) -> Result<(), Fault> {
+    ///
+    /// # Errors
+    /// See [`read_arguments`] and [`write_result`].
+    pub fn describe(&self, description: &[u8], reply: &mut Vec<u8>) -> Result<(), Fault> {
         let (from,): (u32,) = read_arguments(self.arguments)?;
         let rest = description.get(from as usize..).unwrap_or_default();
         let bytes = rest[..rest.len().min(common::DESCRIPTION_PART)].to_vec();

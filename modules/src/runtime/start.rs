@@ -35,15 +35,19 @@ use std::time::Duration;
 const LAST_WORDS: Duration = Duration::from_millis(20);
 
 /// Environment by which launch tells a module what it is.
-pub(crate) mod environment {
-    pub(crate) const CONFIG: &str = "ROHRPOST_CONFIG";
-    pub(crate) const MODULE: &str = "ROHRPOST_MODULE";
-    pub(crate) const LAUNCHER: &str = "ROHRPOST_LAUNCHER";
-    pub(crate) const RESTARTS: &str = "ROHRPOST_RESTARTS";
+pub mod environment {
+    /// The configuration's file.
+    pub const CONFIG: &str = "ROHRPOST_CONFIG";
+    /// The module's name.
+    pub const MODULE: &str = "ROHRPOST_MODULE";
+    /// Process id of launch.
+    pub const LAUNCHER: &str = "ROHRPOST_LAUNCHER";
+    /// Times that it was started again.
+    pub const RESTARTS: &str = "ROHRPOST_RESTARTS";
     /// Set: it begins switched off, and launch switches it on when it is time.
-    pub(crate) const OFF: &str = "ROHRPOST_OFF";
+    pub const OFF: &str = "ROHRPOST_OFF";
     /// Time for which it keeps its lines of output to itself, ms: earlier processes printed the like and ended soon.
-    pub(crate) const QUIET_MS: &str = "ROHRPOST_QUIET_MS";
+    pub const QUIET_MS: &str = "ROHRPOST_QUIET_MS";
 }
 
 /// Descriptors that launch keeps across restarts of this module, in launch's order. Call this once. Empty if launch
@@ -303,7 +307,7 @@ fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
 }
 
 /// Signals that ask a process to end: SIGTERM, SIGINT, and SIGHUP unless it was started to ignore that, as by `nohup`.
-pub(crate) fn stop_signals() -> impl Iterator<Item = i32> {
+pub fn stop_signals() -> impl Iterator<Item = i32> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     [SIGTERM, SIGINT, SIGHUP].into_iter().filter(|signal| *signal != SIGHUP || !sys::ignores(SIGHUP))
 }

@@ -2,11 +2,11 @@
 
 use crate::split::Bytes;
 use rohrpost_config::Principal;
+use rohrpost_launch::launcher::Children;
 use rohrpost_mailbox::Name;
 use rohrpost_modules::call::{CallEnvelope, Deduplicator, Fault, ReplyEnvelope, Request, Verdict};
 use rohrpost_modules::common::{Change, DataHead, DescriptionPart, SetParameters, Status, Subscribe};
 use rohrpost_modules::interfaces::Page;
-use rohrpost_modules::launcher::Children;
 use rohrpost_modules::runtime::read_arguments;
 use rohrpost_modules::schema::Data;
 use rohrpost_modules::types::{Image, LaserScan, OccupancyGrid, Odometry, PointCloud, Twist};

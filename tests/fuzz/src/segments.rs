@@ -8,12 +8,12 @@
 use crate::split::Bytes;
 use crate::streams::{STREAM_STEPS, Stream, ring_file};
 use rohrpost_config::Installation;
+use rohrpost_launch::survey::Survey;
 use rohrpost_mailbox::{
     Label, ModuleState, Name, Node, OverflowPolicy, Participant, Priority, Publications, Receiver, Sender, Shape,
     SystemClock, TimeKeeper, TimeSource, Type, Waiting, monotonic_ns, wait_any,
 };
 use rohrpost_modules::description::noted;
-use rohrpost_modules::survey::Survey;
 use std::fs::OpenOptions;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};

@@ -4,17 +4,17 @@
 //! known offset, 30 ppm, and half a ppm that comes and goes; so the true error of each reading is known, and its own
 //! bound must contain it.
 
-use crate::cases::Case;
-use crate::harness::{End, Failure, sample_in_child};
 use crate::lan::Wire;
 use crate::lan::load::Load;
 use crate::lan::rtnet;
 use crate::lan::skewed::{SKEW, Shown, error_us};
 use crate::lan::udp::Datagrams;
 use crate::lan::wire::address;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{End, Failure, sample_in_child};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::shell::clock::{ClockParts, ClockService, Skew};

@@ -1,9 +1,9 @@
 //! What the turns of a case share: a network of its own, and two nodes with their routers.
 
-use crate::harness::Failure;
 use crate::lan::Wire;
 use crate::lan::nodes::{Network, Nodes, UNPACED};
-use crate::settings::Settings;
+use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::StreamShape;
 use std::cell::Cell as Counter;
 

@@ -2,13 +2,13 @@
 //! sleeps.
 
 use super::ground::{ETHERNET, LanSegment, WHOLE};
-use crate::cases::Case;
-use crate::harness::{Cell, Failure, Pause, time_two_processes};
 use crate::lan::chain::{time_chain, time_mailbox_chain};
 use crate::lan::nodes::{Network, UNPACED};
 use crate::lan::udp::Datagrams;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, Failure, Pause, time_two_processes};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use std::time::Duration;
 
 const MESSAGES_PACED: usize = 1_000;

@@ -11,16 +11,16 @@
 //! junk costs the computer that carries it.
 
 use super::ground::{ETHERNET, LanSegment};
-use crate::cases::Case;
-use crate::harness::{Cell, End, Failure, Pause, time_two_processes};
 use crate::lan::Wire;
 use crate::lan::junk::Junk;
 use crate::lan::nodes::{Network, UNPACED};
 use crate::lan::udp::Datagrams;
 use crate::lan::wire::address;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, End, Failure, Pause, time_two_processes};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use std::cell::RefCell;
 use std::time::Duration;
 
@@ -91,7 +91,7 @@ impl Case for LanJunk {
         ];
         let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
         let mut rows = compare(settings, &subject, &contenders, &versus);
-        let median = crate::statistics::median(rates.borrow().iter().copied());
+        let median = rohrpost_bench_local::statistics::median(rates.borrow().iter().copied());
         rows.extend(median.map(|median| {
             let subject = Subject { case: self.name(), bytes: None, unit: "datagrams/s" };
             Row::alone(subject, "junk to each port", Ok(Summary::single(median)))

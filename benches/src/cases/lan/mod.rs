@@ -10,7 +10,7 @@ mod replicas;
 mod sealed;
 mod urgent;
 
-use super::Case;
+use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {

@@ -13,15 +13,15 @@
 //! process switches: a row of its own shows that.
 
 use super::ground::{LanSegment, WHOLE};
-use crate::cases::Case;
-use crate::harness::{End, Failure};
 use crate::lan::ends::{LanSink, LanSource};
 use crate::lan::flow::{Flow, Flown, KERNEL_SILENCE, LOOK, SILENCE, flow};
 use crate::lan::nodes::{self, Network, UNPACED};
 use crate::lan::udp::Datagrams;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::{Summary, median};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{End, Failure};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::{Summary, median};
 use rohrpost_mailbox::HEAD_BYTES;
 use rohrpost_routers::frame;
 use std::cell::RefCell;

@@ -1,11 +1,11 @@
 //! The cost of sealed datagrams: the hop with keys beside the same hop without, turn by turn.
 
 use super::ground::{ETHERNET, LanSegment};
-use crate::cases::Case;
-use crate::harness::{Cell, Failure, time_two_processes};
 use crate::lan::nodes::{Network, UNPACED};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, Failure, time_two_processes};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 
 /// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {

@@ -23,19 +23,19 @@
 //! routers.
 
 use super::ground::LanSegment;
-use crate::cases::Case;
-use crate::harness::{
-    Cell, Child, End, Failure, Gate, Pause, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
-};
 use crate::lan::Wire;
 use crate::lan::ends::{LanSink, LanSource};
 use crate::lan::flow::{Inlet, LOOK, Outlet};
 use crate::lan::nodes::{self, Network, Nodes};
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::udp::Datagrams;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{
+    Cell, Child, End, Failure, Gate, Pause, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
+};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::{StreamShape, sys};
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -305,7 +305,7 @@ fn flood_rows(
 ) -> Vec<Row> {
     // What the router's mailbox, or the stream, took, and what arrived.
     let row = |contender, rate: fn(&Flooded) -> f64| {
-        let median = crate::statistics::median(floods.iter().map(rate))?;
+        let median = rohrpost_bench_local::statistics::median(floods.iter().map(rate))?;
         let subject = Subject { case: case.into(), bytes: Some(bytes), unit };
         Some(Row::alone(subject, contender, Ok(Summary::single(median))))
     };

@@ -1,13 +1,14 @@
 //! Mailboxes by the library for C, beside Rust: packages of 64 bytes, copied in and out.
 
 use super::turn::{BYTES, at_most, cell};
-use crate::cases::Case;
-use crate::cases::latency;
-use crate::harness::{Cell, Failure, ForeignProgram, Pause, Scratch, time_two_programs};
+use crate::foreign::{ForeignProgram, time_two_programs};
 use crate::languages::compile_c;
-use crate::ours::How;
-use crate::rounds::{Contender, Row, Subject, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, Failure, Pause, Scratch};
+use rohrpost_bench_local::latency;
+use rohrpost_bench_local::ours::How;
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, compare};
+use rohrpost_bench_local::settings::Settings;
 use std::path::PathBuf;
 use std::time::Duration;
 

@@ -5,7 +5,7 @@ mod python;
 mod remote;
 mod turn;
 
-use super::Case;
+use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {

@@ -2,17 +2,16 @@
 //! pictures that are read in place; and calls of a module in Rust.
 
 use super::turn::{BYTES, at_most, cell};
-use crate::cases::Case;
-use crate::cases::case::as_failure;
-use crate::harness::{
-    Cell, Child, End, Failure, ForeignProgram, Scratch, sample_in_child, settle, time_one_program, time_two_programs,
-};
+use crate::cases::errors::as_failure;
+use crate::foreign::{ForeignProgram, time_one_program, time_two_programs};
 use crate::languages::Interpreter;
 use crate::motor::{reach_motor, start_motor};
 use crate::player::player;
-use crate::rounds::{Contender, Row, Subject, compare};
-use crate::settings::Settings;
 use crate::tcp::systems::free_address;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, Child, End, Failure, Scratch, sample_in_child, settle};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, compare};
+use rohrpost_bench_local::settings::Settings;
 use std::fs;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};

@@ -10,15 +10,16 @@
 //! All of them there and back again.
 
 use super::turn::{BYTES, at_most, cell};
-use crate::cases::Case;
 use crate::cases::tcp::TcpSegment;
-use crate::harness::{Cell, Child, End, Failure, Scratch, time_one_program, time_two_programs};
+use crate::foreign::{time_one_program, time_two_programs};
 use crate::languages::Interpreter;
 use crate::motor::start_motor;
-use crate::rounds::{Contender, Row, Subject, compare};
-use crate::settings::Settings;
-use crate::statistics::{Summary, median};
 use crate::tcp::systems::{Security, free_address, system_of};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, Child, End, Failure, Scratch};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::{Summary, median};
 use std::cell::RefCell;
 
 /// Ratio to both parts together.

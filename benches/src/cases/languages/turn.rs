@@ -1,8 +1,8 @@
 //! What turns of all programs have in common.
 
-use crate::harness::{Cell, Pause, Placement, Scheduling};
-use crate::rounds::{Target, Versus};
-use crate::settings::Settings;
+use rohrpost_bench_local::harness::{Cell, Pause, Placement, Scheduling};
+use rohrpost_bench_local::rounds::{Target, Versus};
+use rohrpost_bench_local::settings::Settings;
 use std::time::Duration;
 
 /// Of each message.

@@ -1,9 +1,9 @@
 //! The crate `mcap` with a loop around it: the same chunks, compressed and checked alike, synced at the end.
 
 use super::workload::{CHUNK_BYTES, NAME, Workload};
-use crate::harness::Failure;
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
+use rohrpost_bench_local::harness::Failure;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;

@@ -1,14 +1,14 @@
 //! How long a package is on its way between two modules while a third process records, and while none does.
 
-use super::super::Case;
 use super::workload::{NAME, Workload};
-use crate::harness::{
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{
     Cell, Child, End, Failure, Link, Meetings, Pause, Placement, Scheduling, Scratch, Shared, Zeroable, given_away,
     interrupted, require_asleep, time_two_processes,
 };
-use crate::ours::{How, Mailboxes};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::ours::{How, Mailboxes};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;

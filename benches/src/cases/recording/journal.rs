@@ -2,14 +2,14 @@
 //! before each: modules of a robot wait for what comes. Awake, a command takes a fiftieth of the time, so which of both
 //! it is must be the same in all rounds; that is brought about, and counted.
 
-use super::super::Case;
-use super::super::case::{Done, as_failure};
-use crate::harness::{
+use super::super::errors::{Done, as_failure};
+use crate::motor::{MOTOR, reach_motor, start_motor};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{
     End, Failure, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
 };
-use crate::motor::{MOTOR, reach_motor, start_motor};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{Node, StreamId};
 use rohrpost_modules::journal::JOURNAL_NUMBER;
 use std::fs;

@@ -8,14 +8,14 @@ mod recorder;
 mod replayed;
 mod workload;
 
-use super::Case;
-use crate::harness::{Failure, Scratch, sample_in_child};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
 use beside::PairBeside;
 use journal::NotedEvent;
 use nix::sys::resource::{UsageWho, getrusage};
 use replayed::Replayed;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Failure, Scratch, sample_in_child};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use workload::Workload;

@@ -1,7 +1,7 @@
 //! Our recorder: a queue, and a thread that writes.
 
 use super::workload::{NAME, Workload};
-use crate::harness::Failure;
+use rohrpost_bench_local::harness::Failure;
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;

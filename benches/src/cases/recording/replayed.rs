@@ -1,10 +1,10 @@
 //! How fast the programs of a recorded demo are run again, and how exactly a replay keeps the distances between values.
 
-use super::super::Case;
-use crate::harness::{Child, Failure, Scratch};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Child, Failure, Scratch};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use std::cell::OnceCell;
 use std::fs::{self, File};
 use std::os::unix::process::CommandExt;

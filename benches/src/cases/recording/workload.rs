@@ -1,6 +1,6 @@
 //! What is recorded: the same bytes for all, which compress as what sensors say does: to about a third.
 
-use crate::harness::Failure;
+use rohrpost_bench_local::harness::Failure;
 use std::fs;
 use std::path::Path;
 use std::sync::OnceLock;

@@ -3,11 +3,13 @@
 //! Times are random, the same for all that search among as many stamps. What is found is checked: the sum over a group
 //! is computed beforehand.
 
-use crate::cases::Case;
-use crate::harness::{CycleCounter, End, Failure, Placement, Samples, Scheduling, sample_in_child, settle};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
 use crate::streams::{StreamNode, stream_failure};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{
+    CycleCounter, End, Failure, Placement, Samples, Scheduling, sample_in_child, settle,
+};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{Around, Stamp, StreamShape};
 use std::hint::black_box;
 use std::time::Duration;

@@ -3,11 +3,11 @@
 //! One thread does both, so that nothing waits for another processor. Its two buffers are as near in the caches for
 //! both contenders: one has just been filled, the other just been compared.
 
-use crate::cases::Case;
-use crate::harness::{End, Failure, Placement, Samples, Scheduling, fill, sample_in_child, settle};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
 use crate::streams::{StreamNode, came, stamp};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{End, Failure, Placement, Samples, Scheduling, fill, sample_in_child, settle};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{StreamShape, monotonic_ns};
 use std::hint::black_box;
 use std::time::Duration;
@@ -15,7 +15,7 @@ use std::time::Duration;
 const BYTES: usize = 1 << 20;
 const SHAPE: StreamShape = StreamShape { record_bytes: BYTES as u32, keep: 2, readers: 1, late: Duration::ZERO };
 /// Records of a turn, and those before them that do not count. Few enough to take less than 0.6 s, with filling and
-/// comparing: see [`crate::harness::Cell::cap`].
+/// comparing: see [`rohrpost_bench_local::harness::Cell::cap`].
 const RECORDS: usize = 600;
 const WARM_UP: usize = 60;
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -8,14 +8,14 @@
 //! Only the writes are timed; the time of the clock reading itself is measured before and subtracted. Where readers
 //! sleep, the writer pauses until all have read the record, and a while longer, so that each write wakes all of them.
 
-use crate::cases::Case;
 use crate::floors::ring::CacheLine;
-use crate::harness::{
+use crate::streams::{StreamNode, came, stamp, stream_failure};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{
     Child, CycleCounter, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, fill, settle,
 };
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::streams::{StreamNode, came, stamp, stream_failure};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{RecordInfo, StreamReader, StreamShape, Waiting, monotonic_ns};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

@@ -3,17 +3,16 @@
 //! Each end writes a stream of its own and echoes what the other's brings; one way is half of the round trip. In place,
 //! 16 bytes are written and read at each end, whatever the size.
 
-use crate::cases::Case;
-use crate::cases::rivals::Rival;
-use crate::harness::{Cell, Failure, Pause, Placement, Scheduling, Scratch, time_two_processes};
-use crate::ours::How;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use crate::cases::rivals::ICEORYX_LOANED;
 use crate::streams::StreamLink;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, Failure, Pause, Placement, Scheduling, Scratch, time_two_processes};
+use rohrpost_bench_local::latency::{FUTEX, Rival, SPIN, TOUCHED};
+use rohrpost_bench_local::ours::How;
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use std::time::Duration;
 
-/// Bytes that are touched of what is written and read in place.
-const TOUCHED: usize = 16;
 const SMALL: usize = 64;
 
 /// Round trips of a turn, and those before them that do not count.
@@ -28,13 +27,11 @@ const CAP_AWAKE: Duration = Duration::from_millis(600);
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let at_most = |bound| Some(Target::AtMost(bound));
     let copied = |name, how, rival: Rival, p50, p99| -> Box<dyn Case> {
-        let versus = Versus { name: rival.name(), p50: at_most(p50), p99: at_most(p99) };
+        let versus = Versus { name: rival.name, p50: at_most(p50), p99: at_most(p99) };
         Box::new(CopiedLatency { name, how, rival, versus })
     };
-    let mut cases = vec![
-        copied("spinning", How::Spinning, Rival::Spin, 2.0, 2.0),
-        copied("blocking", How::Blocking, Rival::Futex, 1.2, 1.3),
-    ];
+    let mut cases =
+        vec![copied("spinning", How::Spinning, SPIN, 2.0, 2.0), copied("blocking", How::Blocking, FUTEX, 1.2, 1.3)];
     cases.extend([64 << 10, 1 << 20, 8 << 20].map(|bytes| -> Box<dyn Case> { Box::new(InPlaceLatency { bytes }) }));
     cases
 }
@@ -55,7 +52,7 @@ impl Case for CopiedLatency {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let cell = cell(settings, self.how);
         let ours = Contender::sampled("rohrpost", || turn(&cell, SMALL, self.how));
-        let rival = Contender::sampled(self.versus.name, || self.rival.turn(&cell, TOUCHED));
+        let rival = Contender::sampled(self.versus.name, || (self.rival.turn)(&cell));
         let subject = Subject { case: self.name(), bytes: Some(SMALL), unit: "us" };
         Ok(compare(settings, &subject, &[ours, rival], &[self.versus]))
     }
@@ -74,17 +71,11 @@ impl Case for InPlaceLatency {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let cell = cell(settings, How::Loaned);
         let small = Contender::sampled("rohrpost, 64 B", || turn(&cell, SMALL, How::Loaned));
-        #[allow(unused_mut)]
-        let mut versus = vec![Versus { name: small.name, p50: Some(Target::AtMost(1.2)), p99: None }];
-        #[allow(unused_mut)]
-        let mut contenders = vec![Contender::sampled("rohrpost", || turn(&cell, self.bytes, How::Loaned)), small];
-        #[cfg(feature = "peers")]
-        {
-            let rival = Rival::IceoryxLoaned;
-            let cell = Cell { bytes: self.bytes, ..cell };
-            contenders.push(Contender::sampled(rival.name(), move || rival.turn(&cell, TOUCHED)));
-            versus.push(Versus { name: rival.name(), p50: Some(Target::AtMost(1.0)), p99: None });
-        }
+        let (rival, large) = (ICEORYX_LOANED, Cell { bytes: self.bytes, ..cell });
+        let versus = [(small.name, 1.2), (rival.name, 1.0)];
+        let versus = versus.map(|(name, bound)| Versus { name, p50: Some(Target::AtMost(bound)), p99: None });
+        let ours = Contender::sampled("rohrpost", || turn(&cell, self.bytes, How::Loaned));
+        let contenders = [ours, small, Contender::sampled(rival.name, || (rival.turn)(&large))];
         let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "us" };
         Ok(compare(settings, &subject, &contenders, &versus))
     }

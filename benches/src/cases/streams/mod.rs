@@ -7,7 +7,7 @@ mod latency;
 mod open;
 mod rate;
 
-use super::Case;
+use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {

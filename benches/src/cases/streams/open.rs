@@ -2,11 +2,11 @@
 //!
 //! Both have as many frames, so they differ in nothing but the size of a record. 16 bytes of it are read.
 
-use crate::cases::Case;
-use crate::harness::{End, Failure, Placement, Samples, Scheduling, fill, sample_in_child, settle};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
 use crate::streams::{StreamNode, stamp, stream_failure};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{End, Failure, Placement, Samples, Scheduling, fill, sample_in_child, settle};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{StreamShape, monotonic_ns};
 use std::time::Duration;
 

@@ -1,12 +1,12 @@
 //! Records a second, from a writer to a reader that spins, with nothing lost.
 
-use crate::cases::Case;
 use crate::floors::ring::{BareRing, DEPTH, RingReceiver, RingSender, SharedRing};
-use crate::harness::{Failure, Scheduling, Shared};
 use crate::one_way::{Stream, rate};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
 use crate::streams::{Progress, RecordSink, RecordSource, StreamNode};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Failure, Scheduling, Shared};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::StreamShape;
 use std::time::Duration;
 

@@ -1,14 +1,14 @@
 //! A thousand clients at once: throughput and delay; and whether a client that reads nothing, or a hostile program,
 //! affects the others.
 
-use crate::cases::Case;
-use crate::harness::{Failure, Machine};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::{Ratio, Summary, median};
 use crate::tcp::crowd::{Crowd, Habits};
 use crate::tcp::hostile::Hostile;
 use crate::tcp::systems::{Security, Systems};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Failure, Machine};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::{Ratio, Summary, median};
 use std::cell::RefCell;
 use std::time::Duration;
 

@@ -1,14 +1,14 @@
 //! How long a package takes from a module through the TCP router to a module of another system, one at a time; every
 //! waiting process sleeps.
 
-use crate::cases::Case;
-use crate::harness::{Cell, End, Failure, time_two_processes};
 use crate::lan::ends::Module;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
 use crate::tcp::relays::{time_mailbox_relays, time_relays};
 use crate::tcp::systems::{Security, Systems, bench};
 use crate::tcp::zenoh::time_zenoh;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, End, Failure, time_two_processes};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use std::cell::Cell as Counter;
 use std::time::Duration;
 

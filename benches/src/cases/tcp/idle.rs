@@ -1,12 +1,12 @@
 //! Memory of the TCP router for a client that only sends keep-alives.
 
-use crate::cases::Case;
-use crate::harness::{Failure, rest};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
 use crate::tcp::crowd::{Crowd, Habits};
 use crate::tcp::systems::{Security, Systems};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Failure, rest};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use std::fs;
 use std::time::Duration;
 

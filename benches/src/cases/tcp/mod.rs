@@ -4,10 +4,9 @@ mod clients;
 mod hop;
 mod idle;
 
-#[cfg(feature = "languages")]
 pub(super) use hop::TcpSegment;
 
-use super::Case;
+use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {

@@ -5,12 +5,12 @@ use super::goals::Goal;
 use super::observed::RunConditions;
 use super::plans::BRISK;
 use super::slots::{OMITTED, UNLOADED};
-use crate::cases::Case;
-use crate::harness::Failure;
-use crate::rounds::{Row, Target, Versus};
-use crate::settings::Settings;
-use crate::statistics::Summary;
 use crate::tdma::rights::Rights;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::rounds::{Row, Target, Versus};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 
 /// Nobody has to reach such a cycle.
 const HOPED: (&str, Summary) = ("p99 25 us", Summary { p50: 25.0, p99: Some(25.0), p999: None, max: None });

@@ -6,17 +6,17 @@
 
 use super::goals::{Goal, figure};
 use super::plans::LOADED;
-use crate::cases::Case;
-use crate::harness::{End, Failure, Scratch, sample_in_child};
 use crate::lan::load::Load;
 use crate::lan::skewed::error_us;
 use crate::lan::udp::Datagrams;
 use crate::lan::{Wire, rtnet};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
 use crate::tdma::shells::Shells;
 use crate::tdma::stage::{NODES, Stage};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{End, Failure, Scratch, sample_in_child};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use std::cell::RefCell;
 use std::time::Duration;
 

@@ -2,13 +2,13 @@
 
 use super::goals::{Goal, figure};
 use super::observed::{Observed, RunConditions, watched};
-use crate::Failure;
-use crate::rounds::{Contender, Row, Subject, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::Summary;
 use crate::tdma::bare::BareThreads;
 use crate::tdma::plan::Plan;
 use crate::tdma::stage::Stage;
+use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use std::cell::RefCell;
 
 /// One observed contender.

@@ -5,11 +5,6 @@ use super::contest::BARE;
 use super::goals::{Goal, NONE, figure, spread};
 use super::observed::{ALL, watched};
 use super::plans::FLOWS;
-use crate::cases::Case;
-use crate::harness::{Failure, Machine, alone, rest};
-use crate::rounds::{Row, Subject};
-use crate::settings::Settings;
-use crate::statistics::{Summary, median};
 use crate::tdma::bare::BareThreads;
 use crate::tdma::capture::{Arrived, Capture};
 use crate::tdma::counts::Counts;
@@ -19,6 +14,11 @@ use crate::tdma::routers::Routers;
 use crate::tdma::stage::Stage;
 use crate::tdma::talkers::{Talked, Talkers};
 use crate::tdma::traffic::Traffic;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Failure, Machine, alone, rest};
+use rohrpost_bench_local::rounds::{Row, Subject};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::{Summary, median};
 use std::time::{Duration, Instant};
 
 /// Parts of a turn, each checked for time that the hypervisor took.

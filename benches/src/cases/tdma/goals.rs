@@ -1,7 +1,7 @@
 //! Rows that stand beside what must be reached, and beside what may be hoped for.
 
-use crate::rounds::{Row, Subject, Target, Versus};
-use crate::statistics::{Ratio, Summary, median};
+use rohrpost_bench_local::rounds::{Row, Subject, Target, Versus};
+use rohrpost_bench_local::statistics::{Ratio, Summary, median};
 
 /// A bound of a figure.
 #[derive(Clone, Copy, Debug)]

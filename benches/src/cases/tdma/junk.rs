@@ -8,13 +8,13 @@ use super::contest::BARE;
 use super::goals::{Goal, figure};
 use super::observed::{Observed, PORTS, RunConditions, watched};
 use super::plans::LOADED;
-use crate::cases::Case;
-use crate::harness::Failure;
-use crate::rounds::{Row, Subject};
-use crate::settings::Settings;
 use crate::tdma::bare::BareThreads;
 use crate::tdma::rights::Rights;
 use crate::tdma::stage::Stage;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::rounds::{Row, Subject};
+use rohrpost_bench_local::settings::Settings;
 
 /// A turn is long.
 const ROUNDS_MAX: usize = 3;

@@ -14,7 +14,7 @@ mod replicas;
 mod slots;
 mod takeover;
 
-use super::Case;
+use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {

@@ -1,9 +1,6 @@
 //! A turn of three nodes that always have something to send, watched from outside.
 
-use crate::harness::{Failure, rest};
 use crate::lan::junk::Junk;
-use crate::settings::Settings;
-use crate::statistics::Summary;
 use crate::tdma::capture::Capture;
 use crate::tdma::counts::Counts;
 use crate::tdma::kept::Kept;
@@ -12,6 +9,9 @@ use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
 use crate::tdma::stage::{NODES, Stage};
 use crate::tdma::traffic::Traffic;
+use rohrpost_bench_local::harness::{Failure, rest};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 use std::time::Duration;
 
 /// Length of a turn.

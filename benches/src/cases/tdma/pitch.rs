@@ -7,12 +7,12 @@ use super::goals::{Goal, NONE, figure};
 use super::observed::{Observed, RunConditions};
 use super::plans::{SHORT_PITCH, SHORTEST_PITCH, WIDE_GUARD};
 use super::slots::{OMITTED, OMITTED_MUST};
-use crate::cases::Case;
-use crate::harness::Failure;
-use crate::rounds::Row;
-use crate::settings::Settings;
 use crate::tdma::plan::Plan;
 use crate::tdma::rights::Rights;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::rounds::Row;
+use rohrpost_bench_local::settings::Settings;
 
 const INTO_GUARD: Figure =
     Figure { what: "into the guard", unit: "us in", of: |seen| seen.kept.into_guard_us, goals: &[] };

@@ -11,11 +11,6 @@ use super::goals::{NONE, figure};
 use super::observed::{ALL, watched};
 use super::plans::REPLICAS;
 use super::slots::OMITTED;
-use crate::cases::Case;
-use crate::harness::{Failure, alone, rest};
-use crate::rounds::{Row, Subject, Target, Versus};
-use crate::settings::Settings;
-use crate::statistics::{Ratio, Summary, median};
 use crate::tdma::bare::BareThreads;
 use crate::tdma::capture::{Arrived, Capture};
 use crate::tdma::counts::Counts;
@@ -25,6 +20,11 @@ use crate::tdma::routers::Routers;
 use crate::tdma::stage::Stage;
 use crate::tdma::talkers::{Talked, Talkers};
 use crate::tdma::traffic::Traffic;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Failure, alone, rest};
+use rohrpost_bench_local::rounds::{Row, Subject, Target, Versus};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::{Ratio, Summary, median};
 use std::time::Duration;
 
 /// Until nothing waits any more of what showed that all nodes send.

@@ -5,13 +5,13 @@ use super::contest::{ALWAYS, BARE, Contest, Figure, Held, ObservedRounds, Watche
 use super::goals::{Goal, figure};
 use super::observed::{Observed, RunConditions};
 use super::plans::LOADED;
-use crate::cases::Case;
-use crate::harness::Failure;
-use crate::rounds::{Row, Target, Versus};
-use crate::settings::Settings;
-use crate::statistics::Summary;
 use crate::tdma::bare::BareThreads;
 use crate::tdma::rights::Rights;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::rounds::{Row, Target, Versus};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::Summary;
 
 const fn bounds(p50: f64, p99: f64, p999: f64) -> Summary {
     Summary { p50, p99: Some(p99), p999: Some(p999), max: None }

@@ -13,8 +13,8 @@ use rohrpost::common::OutputLevel;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::MotorInterface;
 use rohrpost::output::OutputLine;
-use rohrpost::survey::{ModuleSurvey, StreamSurvey, Survey, Usage, sum};
 use rohrpost_config::Installation;
+use rohrpost_launch::survey::{ModuleSurvey, StreamSurvey, Survey, Usage, sum};
 use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{
     Class, ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, Missed, ModuleState, OverflowPolicy, ParticipantInfo,

@@ -1,14 +1,14 @@
 //! How long a pose takes from a module on one node to a module on another as a record of a stream, beside a package of
 //! the same routers; every waiting process sleeps.
 
-use crate::cases::Case;
 use crate::cases::lan::ground::{LanSegment, replicating};
-use crate::harness::{Cell, End, Failure, Scheduling, time_two_processes};
 use crate::lan::nodes::index;
 use crate::lan::records::RecordLink;
 use crate::lan::udp::Datagrams;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Cell, End, Failure, Scheduling, time_two_processes};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::StreamShape;
 use std::time::Duration;
 

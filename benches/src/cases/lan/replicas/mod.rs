@@ -4,7 +4,7 @@ mod hop;
 mod rate;
 mod readers;
 
-use crate::cases::Case;
+use rohrpost_bench_local::Case;
 
 /// All cases of this folder.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {

@@ -8,16 +8,16 @@
 //! The writer has a window of records in flight, as a camera has that takes the next picture when one is through:
 //! without one it would write over what has not left. Records are written whole and read in place.
 
-use crate::cases::Case;
 use crate::cases::lan::ground::{LanSegment, replicating};
 use crate::cases::lan::rates::{Losses, SENDER_FIFO, TURN, cbware};
-use crate::harness::{End, Failure};
 use crate::lan::flow::{Flow, KERNEL_SILENCE, LOOK, SILENCE, flow};
 use crate::lan::nodes::index;
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::udp::{Datagrams, RawParts};
-use crate::rounds::{Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{End, Failure};
+use rohrpost_bench_local::rounds::{Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::StreamShape;
 use rohrpost_routers::frame;
 use std::time::Duration;

@@ -1,15 +1,15 @@
 //! What crosses the wire for ten readers of one replica on one node, beside what crosses it for one: each record once.
 
-use crate::cases::Case;
 use crate::cases::lan::ground::{LanSegment, replicating};
-use crate::harness::{Child, End, Failure, Gate, Shared, Zeroable};
 use crate::lan::flow::{FILLER, Inlet, Outlet, SILENCE, checked, put_number};
 use crate::lan::nodes::index;
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::sent::Sent;
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use crate::settings::Settings;
-use crate::statistics::{Summary, median};
+use rohrpost_bench_local::Case;
+use rohrpost_bench_local::harness::{Child, End, Failure, Gate, Shared, Zeroable};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::statistics::{Summary, median};
 use rohrpost_mailbox::StreamShape;
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicU64, Ordering};

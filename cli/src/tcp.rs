@@ -1,0 +1,33 @@
+//! `rohrpost tcp-router` and `rohrpost tcp-client`: carry packages beyond the LAN. Launch starts them as `[tcp]`
+//! requires.
+
+use crate::terminal::Failure;
+use rohrpost::Start;
+use rohrpost_modules::runtime::exit;
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example, on the node that `server` of [tcp] names: rohrpost tcp-router --config robot.toml --name \
+        tcp.255
+Launch starts both, the client on every node; start them by hand only if you start modules by hand."
+)]
+pub(super) struct Arguments {
+    /// The arguments of every module: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the
+    /// clients of the nodes.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
+}
+
+/// Runs the server.
+pub(super) fn serve(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter());
+    Ok(exit(start.and_then(rohrpost_router_daemon::run_tcp_router)))
+}
+
+/// Runs a client.
+pub(super) fn join(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter());
+    Ok(exit(start.and_then(rohrpost_router_daemon::run_tcp_client)))
+}

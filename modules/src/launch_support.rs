@@ -1,0 +1,10 @@
+//! What launch shares with the modules that it starts: their environment, the signals that end them, their lines of
+//! output, and how commands are taken. Not for people: launch is in another crate.
+
+pub use crate::output::relay::{OutputProxy, Relay, WeakOutputProxy};
+pub use crate::output::trace::LINES_MAX as TRACE_LINES_MAX;
+pub use crate::output::{SENT, TRACED};
+pub use crate::runtime::refusals::{Cause, Refusals};
+pub use crate::runtime::server::{Command, CommandHandler, CommandServer, admit};
+pub use crate::runtime::start::{environment, stop_signals};
+pub use crate::runtime::work::in_words;
