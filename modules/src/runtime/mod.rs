@@ -12,6 +12,8 @@
 mod clock;
 mod context;
 mod endpoint;
+#[doc(hidden)]
+pub mod environment;
 mod error;
 mod exact;
 mod exchange;

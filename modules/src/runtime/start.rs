@@ -3,6 +3,7 @@
 use super::clock::ModuleClock;
 use super::context::Context;
 use super::endpoint::{Endpoint, Offered};
+use super::environment;
 use super::error::StartError;
 use super::incarnation::Incarnation;
 use super::parameters;
@@ -33,22 +34,6 @@ use std::time::Duration;
 
 /// For a process that is ended by force to say so.
 const LAST_WORDS: Duration = Duration::from_millis(20);
-
-/// Environment by which launch tells a module what it is.
-pub mod environment {
-    /// The configuration's file.
-    pub const CONFIG: &str = "ROHRPOST_CONFIG";
-    /// The module's name.
-    pub const MODULE: &str = "ROHRPOST_MODULE";
-    /// Process id of launch.
-    pub const LAUNCHER: &str = "ROHRPOST_LAUNCHER";
-    /// Times that it was started again.
-    pub const RESTARTS: &str = "ROHRPOST_RESTARTS";
-    /// Set: it begins switched off, and launch switches it on when it is time.
-    pub const OFF: &str = "ROHRPOST_OFF";
-    /// Time for which it keeps its lines of output to itself, ms: earlier processes printed the like and ended soon.
-    pub const QUIET_MS: &str = "ROHRPOST_QUIET_MS";
-}
 
 /// Descriptors that launch keeps across restarts of this module, in launch's order. Call this once. Empty if launch
 /// keeps none, or the module was started by hand.
