@@ -81,7 +81,7 @@ const ALL: [Stage; 7] = [
     },
     Stage { name: "drawings, with Rerun's command line", budget_s: 220, run: || whole(drawings()) },
     Stage { name: "recordings, with Python's reader", budget_s: 30, run: || whole(recordings()) },
-    Stage { name: "the client in Python, installed, with mypy", budget_s: 130, run: || whole(python_client()) },
+    Stage { name: "the client in Python, installed, with mypy", budget_s: 170, run: || whole(python_client()) },
     Stage { name: "ThreadSanitizer", budget_s: 40, run: || whole(tsan::run().map(drop)) },
     Stage { name: "instructions of the hot paths", budget_s: 380, run: || whole(instructions::check()) },
     Stage { name: "fuzzing, short", budget_s: 470, run: || whole(fuzz::short()) },

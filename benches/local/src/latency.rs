@@ -105,7 +105,7 @@ pub fn blocking(bytes: usize) -> Latency {
 pub fn spinning(bytes: usize) -> Latency {
     let bound = match bytes {
         ..=64 => 1.4,
-        ..=1024 => 1.15,
+        65..=1024 => 1.15,
         _ => 1.0,
     };
     Latency::new("spinning", bytes, How::Spinning).beside(SPIN, at_most(bound), None)
