@@ -1,7 +1,7 @@
 //! The files of a crate, and which names which.
 //!
 //! A file *names* another when a path in it leads to something defined there: `use crate::a::B`, `super::B`, `a::B`
-//! with `a` imported or declared here. Re-exports are looked through. A parent that declares `mod a;` and re-exports
+//! with `a` imported or declared here, also in attributes. Re-exports are looked through. A parent that declares `mod a;` and re-exports
 //! from below does not name what it re-exports. Tests are left out.
 
 use proc_macro2::{TokenStream, TokenTree};
@@ -246,6 +246,19 @@ impl Names<'_> {
         }
         self.path(&path);
     }
+
+    /// Attributes of serde have paths in texts: `with = "crate::seconds"` means the functions of that module.
+    fn texts(&mut self, tokens: TokenStream) {
+        for literal in tokens.into_iter().filter(|token| matches!(token, TokenTree::Literal(_))) {
+            let Ok(text) = syn::parse2::<syn::LitStr>(literal.into()) else { continue };
+            let Ok(path) = text.parse::<syn::Path>() else { continue };
+            let path: Place = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
+            for function in [None, Some("serialize"), Some("deserialize")] {
+                let path: Place = path.iter().cloned().chain(function.map(String::from)).collect();
+                self.path(&path);
+            }
+        }
+    }
 }
 
 impl<'ast> Visit<'ast> for Names<'_> {
@@ -297,6 +310,13 @@ impl<'ast> Visit<'ast> for Names<'_> {
             self.path(&path);
         }
         visit::visit_path(self, path);
+    }
+
+    fn visit_attribute(&mut self, it: &'ast syn::Attribute) {
+        if let syn::Meta::List(list) = &it.meta {
+            self.tokens(list.tokens.clone());
+            self.texts(list.tokens.clone());
+        }
     }
 
     fn visit_macro(&mut self, it: &'ast syn::Macro) {

@@ -22,8 +22,8 @@ mod sampler;
 mod tap;
 mod taps;
 
+use crate::computer::version;
 use crate::router::NoSettings;
-use crate::version;
 use control::{ControlServer, Orders, Told};
 use earlier::EarlierFiles;
 use health::Health;
