@@ -1,8 +1,8 @@
 //! The files of a crate, and which names which.
 //!
 //! A file *names* another when a path in it leads to something defined there: `use crate::a::B`, `super::B`, `a::B`
-//! with `a` imported or declared here, also in attributes. Re-exports are looked through. A parent that declares `mod a;` and re-exports
-//! from below does not name what it re-exports. Tests are left out.
+//! with `a` imported or declared here, also in attributes. Re-exports are looked through. A parent that declares
+//! `mod a;` and re-exports from below does not name what it re-exports. Tests are left out.
 
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
