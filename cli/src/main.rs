@@ -1,9 +1,9 @@
-//! The `rohrpost` command. A folder for each kind of command, and in it one file or folder for each subcommand: `begin`,
-//! `running`, `measure`, `record` and `replay`, `nodes`, `computer`.
+//! The `rohrpost` command. A folder for each kind of command, and in it one file or folder for each subcommand:
+//! `begin`, `running`, `measure`, `record` and `replay`, `nodes`, `computer`.
 //!
-//! Commands share `look`, which reads a node, near or far, and `terminal`: output, tables, units. `router` and `tcp` make
-//! modules of the routers' cores. `launch` opens their sockets, `manager` talks to systemd. Golden files hold what `top`
-//! and `doctor` show.
+//! Commands share `look`, which reads a node, near or far, and `terminal`: output, tables, units. `router` and `tcp`
+//! make modules of the routers' cores. `launch` opens their sockets, `manager` talks to systemd. Golden files hold what
+//! `top` and `doctor` show.
 
 #![forbid(unsafe_code)]
 // All output goes through `say` and `complain`, which escape what a terminal would obey.

@@ -277,7 +277,7 @@ fn strict_verifiers_accept_the_certificates() {
     for made in [Step::New, rotate as fn(Place) -> Step] {
         step(made, &file).unwrap();
         let mut python = std::process::Command::new("python3");
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/keys/strict.py");
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/nodes/keys/strict.py");
         python.arg(script).arg(place.path().join("shown")).args(["tcp-router", "desk.system-1"]);
         let said = python.output().unwrap();
         assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
