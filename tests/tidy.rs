@@ -6,6 +6,8 @@
 mod node_files;
 #[path = "tidy/sources.rs"]
 mod sources;
+#[path = "tidy/syntax.rs"]
+mod syntax;
 #[path = "tidy/words.rs"]
 mod words;
 

@@ -4,10 +4,10 @@ mod all;
 mod log_lines;
 mod sockets;
 
-use super::call::level_of;
 use super::manager::Manager;
-use super::speech::Speech;
-use super::summary::{ModuleLine, module_lines, print_modules_live};
+use crate::look::summary::{ModuleLine, module_lines, print_modules_live};
+use crate::running::call::level_of;
+use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, columns, folded, rows};
 pub(super) use all::{LaunchedNodes, lab};
 use log_lines::LogLines;
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// Reads an installation that can run here: mistakes that a router would find only at its start are reported at once. A
 /// node without a router needs no keys.
 fn load(arguments: &Arguments) -> Result<Arc<Installation>, Failure> {
-    let installation = super::check::load(&arguments.file)?;
+    let installation = crate::begin::check::load(&arguments.file)?;
     let node = arguments.node.as_deref();
     if node.is_none_or(|node| installation.router_of(node).is_some()) {
         installation.keys.as_deref().map(|folder| Keys::load(&Keys::file(folder))).transpose()?;
@@ -101,7 +101,7 @@ fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     let log = least.map(|least| LogLines::new(&installation, &node, least)).transpose()?;
     let mut manager = Manager::from_environment(|warning| speech.complain(warning));
     manager.starting(&node);
-    let resolved = crate::resolved::of_node(&installation, &node);
+    let resolved = crate::look::resolved::of_node(&installation, &node);
     let sockets = sockets::of(installation.clone(), node.clone());
     let mut launch =
         Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, &resolved, sockets)?;

@@ -1,76 +1,41 @@
-//! The `rohrpost` command: one file or folder for each subcommand.
+//! The `rohrpost` command. A folder for each kind of command, and in it one file or folder for each subcommand:
+//! `begin`, `running`, `measure`, `record` and `replay`, `nodes`, `computer`.
 //!
-//! `look` reads a node, near or far. `launch` opens the routers' sockets, `manager` talks to systemd, `speech` prints
-//! without waiting for a reader. Golden files hold what `top` and `doctor` show.
+//! Commands share `look`, which reads a node, near or far, and `terminal`: output, tables, units. `launch` opens the
+//! routers' sockets, `manager` talks to systemd. Golden files hold what `top` and `doctor` show.
 
 #![forbid(unsafe_code)]
 // All output goes through `say` and `complain`, which escape what a terminal would obey.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+mod begin;
 mod bench;
-mod bw;
-mod call;
-mod carried;
-mod check;
-mod clean;
 mod command_line;
-mod completions;
-mod control;
+mod computer;
 mod daemons;
-mod delay;
-mod demo;
-mod doctor;
-mod echo;
 mod exact;
-mod flows;
-mod graph;
-mod help;
-mod hz;
-mod interface;
-mod keys;
 mod launch;
-mod list;
-mod log;
 mod logd;
 mod look;
-mod mailbox;
 mod manager;
-mod net;
-mod new;
-mod observer;
-mod param;
-mod ping;
-mod published;
-mod quantities;
+mod measure;
+mod nodes;
 mod quota;
 mod record;
 mod replay;
-mod resolved;
-mod round;
 mod router;
-mod run;
-mod send;
-mod signed;
-mod slots;
-mod speech;
-mod status;
-mod stream;
-mod summary;
-mod table;
-mod target;
+mod running;
 mod tcp;
 mod terminal;
-mod time;
-mod top;
-mod units;
-mod version;
-mod vocabulary;
-mod watch;
-mod whole_file;
 
+use begin::{check, demo, interface, new};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use computer::{clean, completions, doctor, run, version};
+use measure::{bw, delay, graph, hz, mailbox, ping, send, stream};
+use nodes::{keys, net, time};
+use running::{call, control, echo, list, log, param, status, top};
 use std::process::ExitCode;
-use terminal::complain;
+use terminal::{complain, help, signed};
 
 /// Prioritised mailboxes for robots: configure, launch, inspect, call.
 #[derive(Parser)]

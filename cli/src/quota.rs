@@ -1,7 +1,7 @@
 //! What a recording may ask of this computer when it is replayed. It may be of strangers, and a small file may unpack
 //! to anything, or have a configuration that asks for all memory.
 
-use crate::units::size;
+use crate::terminal::units::size;
 use std::path::Path;
 use thiserror::Error;
 

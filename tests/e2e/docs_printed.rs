@@ -111,7 +111,7 @@ pub(crate) fn shown(page: &str) -> Vec<(String, Vec<String>)> {
 }
 
 /// A screen of `top`, as its own tests have it.
-const SCREEN: &str = include_str!("../../cli/src/top/golden/table-80x24.txt");
+const SCREEN: &str = include_str!("../../cli/src/running/top/golden/table-80x24.txt");
 
 /// Units that a number takes, depending on how large it is.
 const UNITS: [&str; 13] = ["ns", "µs", "ms", "s", "min", "h", "B", "kB", "MB", "KiB", "MiB", "B/s", "kB/s"];

@@ -1,9 +1,10 @@
 //! The files of a crate, and which names which.
 //!
 //! A file *names* another when a path in it leads to something defined there: `use crate::a::B`, `super::B`, `a::B`
-//! with `a` imported or declared here. Re-exports are looked through. A parent that declares `mod a;` and re-exports
-//! from below does not name what it re-exports. Tests are left out.
+//! with `a` imported or declared here, also in attributes. Re-exports are looked through. A parent that declares
+//! `mod a;` and re-exports from below does not name what it re-exports. Tests are left out.
 
+use crate::syntax::{Place, Used, absolute, attributes, defines, is_test, type_name, used};
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -24,9 +25,6 @@ pub(crate) fn find_crates(folder: &Path, found: &mut Vec<PathBuf>) {
         }
     }
 }
-
-/// A path from the root of its crate.
-type Place = Vec<String>;
 
 /// What a module has by name.
 #[derive(Default)]
@@ -246,6 +244,19 @@ impl Names<'_> {
         }
         self.path(&path);
     }
+
+    /// Attributes of serde have paths in texts: `with = "crate::seconds"` means the functions of that module.
+    fn texts(&mut self, tokens: TokenStream) {
+        for literal in tokens.into_iter().filter(|token| matches!(token, TokenTree::Literal(_))) {
+            let Ok(text) = syn::parse2::<syn::LitStr>(literal.into()) else { continue };
+            let Ok(path) = text.parse::<syn::Path>() else { continue };
+            let path: Place = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
+            for function in [None, Some("serialize"), Some("deserialize")] {
+                let path: Place = path.iter().cloned().chain(function.map(String::from)).collect();
+                self.path(&path);
+            }
+        }
+    }
 }
 
 impl<'ast> Visit<'ast> for Names<'_> {
@@ -299,100 +310,15 @@ impl<'ast> Visit<'ast> for Names<'_> {
         visit::visit_path(self, path);
     }
 
+    fn visit_attribute(&mut self, it: &'ast syn::Attribute) {
+        if let syn::Meta::List(list) = &it.meta {
+            self.tokens(list.tokens.clone());
+            self.texts(list.tokens.clone());
+        }
+    }
+
     fn visit_macro(&mut self, it: &'ast syn::Macro) {
         visit::visit_macro(self, it);
         self.tokens(it.tokens.clone());
     }
-}
-
-/// One name that a `use` brings, or all those of a path.
-struct Used {
-    path: Place,
-    name: Option<String>,
-}
-
-fn used(tree: &syn::UseTree) -> Vec<Used> {
-    let one =
-        |name: &syn::Ident, called: &syn::Ident| Used { path: vec![name.to_string()], name: Some(called.to_string()) };
-    match tree {
-        syn::UseTree::Path(path) => {
-            let (first, mut below) = (path.ident.to_string(), used(&path.tree));
-            for used in &mut below {
-                // `a::{self}` is `a`.
-                if used.path == ["self"] {
-                    used.path.clear();
-                    used.name = used.name.take().map(|name| if name == "self" { first.clone() } else { name });
-                }
-                used.path.insert(0, first.clone());
-            }
-            below
-        }
-        syn::UseTree::Name(name) => vec![one(&name.ident, &name.ident)],
-        syn::UseTree::Rename(rename) => vec![one(&rename.ident, &rename.rename)],
-        syn::UseTree::Glob(_) => vec![Used { path: Vec::new(), name: None }],
-        syn::UseTree::Group(group) => group.items.iter().flat_map(used).collect(),
-    }
-}
-
-/// A path as seen from a module, from the root of the crate; none if it begins with something that is no module here.
-fn absolute(place: &Place, children: &BTreeSet<String>, path: &[String]) -> Option<Place> {
-    let (first, mut rest) = path.split_first()?;
-    let mut begin = place.clone();
-    match first.as_str() {
-        "crate" => begin.clear(),
-        "self" => {}
-        "super" => drop(begin.pop()),
-        child if children.contains(child) => begin.push(first.clone()),
-        _ => return None,
-    }
-    while let Some(("super", below)) = rest.split_first().map(|(name, below)| (name.as_str(), below)) {
-        begin.pop();
-        rest = below;
-    }
-    Some(begin.into_iter().chain(rest.iter().cloned()).collect())
-}
-
-fn is_test(attributes: &[syn::Attribute]) -> bool {
-    let word = |attribute: &syn::Attribute| attribute.parse_args::<syn::Ident>().is_ok_and(|word| word == "test");
-    attributes.iter().any(|attribute| attribute.path().is_ident("cfg") && word(attribute))
-}
-
-fn attributes(item: &syn::Item) -> &[syn::Attribute] {
-    match item {
-        syn::Item::Const(item) => &item.attrs,
-        syn::Item::Enum(item) => &item.attrs,
-        syn::Item::Fn(item) => &item.attrs,
-        syn::Item::Impl(item) => &item.attrs,
-        syn::Item::Macro(item) => &item.attrs,
-        syn::Item::Mod(item) => &item.attrs,
-        syn::Item::Static(item) => &item.attrs,
-        syn::Item::Struct(item) => &item.attrs,
-        syn::Item::Trait(item) => &item.attrs,
-        syn::Item::Type(item) => &item.attrs,
-        syn::Item::Use(item) => &item.attrs,
-        _ => &[],
-    }
-}
-
-fn type_name(item: &syn::Item) -> Option<String> {
-    let is_type = matches!(
-        item,
-        syn::Item::Enum(_) | syn::Item::Struct(_) | syn::Item::Trait(_) | syn::Item::Type(_) | syn::Item::Union(_)
-    );
-    if is_type { defines(item) } else { None }
-}
-
-fn defines(item: &syn::Item) -> Option<String> {
-    let ident = match item {
-        syn::Item::Const(item) => &item.ident,
-        syn::Item::Enum(item) => &item.ident,
-        syn::Item::Fn(item) => &item.sig.ident,
-        syn::Item::Static(item) => &item.ident,
-        syn::Item::Struct(item) => &item.ident,
-        syn::Item::Trait(item) => &item.ident,
-        syn::Item::Type(item) => &item.ident,
-        syn::Item::Union(item) => &item.ident,
-        _ => return None,
-    };
-    Some(ident.to_string())
 }

@@ -16,8 +16,8 @@ mod journals;
 mod program;
 mod records;
 
+use crate::begin::demo::Folder;
 use crate::command_line::command_line;
-use crate::demo::Folder;
 use crate::quota::UnpackedQuota;
 use crate::terminal::{Failure, complain, say};
 pub(super) use answers::JournalAnswers;

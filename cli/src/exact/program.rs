@@ -2,7 +2,7 @@
 
 use super::command::ModuleCommand;
 use super::journals::RecordedRun;
-use crate::demo::{Folder, is_built_in, write_map};
+use crate::begin::demo::{Folder, is_built_in, write_map};
 use crate::quota::check_shared;
 use crate::terminal::Failure;
 use rohrpost_modules::journal::{ExactRun, ReplayReport, VARIABLE};

@@ -10,8 +10,8 @@
 //! first. If this command dies, the kernel tells each launch to stop; when the last process of a node has ended, its
 //! namespace is gone.
 
-use crate::speech::Speech;
 use crate::terminal::Failure;
+use crate::terminal::speech::Speech;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::{Pid, getppid};
 use rohrpost_config::{Installation, Reach};

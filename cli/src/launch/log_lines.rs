@@ -1,6 +1,6 @@
 //! `launch --log`: what the modules of a node say, asked of the collector page by page. Nothing here waits for it.
 
-use crate::log::LINES_FROM;
+use crate::running::log::LINES_FROM;
 use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;

@@ -22,7 +22,7 @@ mod sampler;
 mod tap;
 mod taps;
 
-use crate::version;
+use crate::computer::version;
 use control::{ControlServer, Orders, Told};
 use earlier::EarlierFiles;
 use health::Health;

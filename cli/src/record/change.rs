@@ -3,8 +3,8 @@
 use super::info::more_damages;
 use super::part::PartArguments;
 use super::progress::ProgressLine;
+use crate::terminal::units::size;
 use crate::terminal::{Failure, say};
-use crate::units::size;
 use rohrpost_recording::Recovered;
 use serde_json::json;
 use std::path::{Path, PathBuf};

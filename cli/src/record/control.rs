@@ -1,8 +1,8 @@
 //! `record on`, `off`, `directory`, `status`, `mark` and `rotate`: orders to the recorder that runs.
 
-use crate::target::{Running, Target};
+use crate::look::target::{Running, Target};
+use crate::terminal::units::seconds;
 use crate::terminal::{Failure, say};
-use crate::units::seconds;
 use rohrpost::ToolLink;
 use rohrpost::interfaces::RecorderInterface;
 use rohrpost::output::plain;

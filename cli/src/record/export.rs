@@ -3,8 +3,8 @@
 use super::jsonl::{JsonLines, JsonMessage};
 use super::part::PartArguments;
 use super::progress::ProgressLine;
+use crate::terminal::units::size;
 use crate::terminal::{Failure, complain, say};
-use crate::units::size;
 use rohrpost::output::plain::{self, ForeignText};
 use rohrpost_recording::{DrawOptions, Drawn, Info, Reader, Selection};
 use std::collections::BTreeMap;

@@ -1,9 +1,9 @@
 //! `record info`: what is in files.
 
-use crate::stream::stamp_text;
-use crate::table::table;
+use crate::measure::stream::stamp_text;
+use crate::terminal::table::table;
+use crate::terminal::units::size;
 use crate::terminal::{Failure, complain, say};
-use crate::units::size;
 use rohrpost::output::plain::ForeignText;
 use rohrpost::schema::describe_type;
 use rohrpost_recording::format::PROFILE;

@@ -6,7 +6,7 @@ use rohrpost_recording::{Info, Selection};
 /// A time range.
 #[derive(clap::Args)]
 pub(crate) struct PartArguments {
-    /// What arrived from then on: seconds since 1970, from the begin (+10s), or before the end (-10s).
+    /// What arrived from then on: seconds since 1970, from the start (+10s), or before the end (-10s).
     #[arg(long, value_name = "TIME", value_parser = parse_time, allow_hyphen_values = true)]
     from: Option<RecordTime>,
     /// What arrived before then.

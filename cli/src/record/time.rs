@@ -1,6 +1,6 @@
 //! A time in a recording, as people write it.
 
-use crate::stream::{Offset, parse_offset, parse_stamp};
+use crate::measure::stream::{Offset, parse_offset, parse_stamp};
 use rohrpost_recording::Info;
 
 /// A time in a recording.
@@ -32,7 +32,7 @@ pub(super) fn parse_time(text: &str) -> Result<RecordTime, String> {
         Some(Offset::Before(ns)) => return Ok(RecordTime::BeforeEnd(ns)),
         None => {}
     }
-    let wrong = "write seconds since 1970 (1700000000.25), from the begin (+10s), or before the end (-10s)";
+    let wrong = "write seconds since 1970 (1700000000.25), from the start (+10s), or before the end (-10s)";
     parse_stamp(text).map(RecordTime::At).map_err(|_| wrong.to_owned())
 }
 

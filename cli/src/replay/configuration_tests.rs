@@ -70,7 +70,7 @@ fn made(text: &str, modules: &[(&str, Description)], runs: &[&str], names: &[&st
     let installation = installation.unwrap_or_else(|errors| panic!("{errors}\n{text}"));
     let player = installation.classes.parse_module(&player).unwrap();
     assert_eq!(installation.module(player).unwrap().program, Program::Builtin(REPLAY.into()));
-    (crate::check::validate(installation).unwrap(), played)
+    (crate::begin::check::validate(installation).unwrap(), played)
 }
 
 fn names(installation: &Installation) -> Vec<String> {

@@ -22,13 +22,13 @@ mod sizes;
 mod spacing;
 mod tables;
 
-use crate::check;
-use crate::demo::{Folder, drawing, drawn, is_built_in, write_map};
+use crate::begin::check;
+use crate::begin::demo::{Folder, drawing, drawn, is_built_in, write_map};
 use crate::exact::{self, ExactArguments, ExactProgram, JournalAnswers};
 use crate::launch::end;
 use crate::quota::check_shared;
 use crate::record::PartArguments;
-use crate::speech::Speech;
+use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, complain, say};
 use configuration::{NODE, PlayedModules, ReplayWish, saved_of};
 use others::IntoStream;
@@ -168,7 +168,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let installation = Arc::new(made.installation);
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
     let speech = Speech::begin()?;
-    let resolved = crate::resolved::of_node(&installation, NODE);
+    let resolved = crate::look::resolved::of_node(&installation, NODE);
     let mut launch = Launch::begin(installation, NODE, std::env::current_exe()?, events()?, &resolved)?;
     let summary = ReplaySession::new(&launch, &made.player, &made.played).and_then(|mut session| {
         session.watch(&mut launch, &speech, arguments.quiet, arguments.paused)?;

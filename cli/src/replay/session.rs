@@ -2,9 +2,9 @@
 
 use super::configuration::{NODE, PlayedModules};
 use crate::launch::TerminalView;
-use crate::speech::Speech;
 use crate::terminal::Failure;
-use crate::units::short;
+use crate::terminal::speech::Speech;
+use crate::terminal::units::short;
 use rohrpost::interfaces::{ReplayInterface, ReplayPosition};
 use rohrpost::wire::from_bytes;
 use rohrpost::{CallError, Name};

@@ -15,6 +15,7 @@
 //! looks new to the next server.
 
 use super::Fault;
+use super::envelope::TRANSIT_MAX;
 use crate::places::Places;
 use rohrpost_config::Principal;
 use rohrpost_mailbox::Name;
@@ -30,8 +31,6 @@ pub const REPLIES_KEPT: usize = 8;
 /// Numbers of each caller of which it is known whether they were run. More than answers, since a caller counts all its
 /// calls, and those to others come in between.
 pub const WINDOW: u32 = u128::BITS;
-/// Longest time that a command is on its way between two nodes, uncounted by its age.
-pub const TRANSIT_MAX: Duration = Duration::from_secs(2);
 const TRANSIT_MAX_NS: u64 = TRANSIT_MAX.as_nanos() as u64;
 const _: () = assert!(WINDOW as usize > REPLIES_KEPT, "an answer that is kept belongs to a number that is known");
 

@@ -8,6 +8,9 @@
 use rohrpost_mailbox::Short;
 use std::time::Duration;
 
+/// Longest time that a command is on its way between two nodes, uncounted by its age.
+pub const TRANSIT_MAX: Duration = Duration::from_secs(2);
+
 /// Before a command's arguments.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct CallEnvelope {

@@ -1,5 +1,6 @@
 //! Errors of calls: of the caller, the server and the routers.
 
+use super::envelope::TRANSIT_MAX;
 use super::{CallEnvelope, ReplyEnvelope};
 use crate::call::append;
 use crate::common::HASH;
@@ -121,7 +122,7 @@ pub enum Fault {
         "a later incarnation of this caller has called it already: two programs have this name, or the computer's \
          clock was set back \
          before the node was launched; this passes {} s after the later one's last call was over",
-        super::deduplicator::TRANSIT_MAX.as_secs()
+        TRANSIT_MAX.as_secs()
     )]
     EarlierIncarnation,
 }

@@ -14,9 +14,9 @@ mod pending;
 mod tally;
 
 pub use caller::Caller;
-pub use deduplicator::{CALLERS_MAX, Deduplicator, REPLIES_KEPT, Request, TRANSIT_MAX, VALIDITY_MAX, Verdict, WINDOW};
+pub use deduplicator::{CALLERS_MAX, Deduplicator, REPLIES_KEPT, Request, VALIDITY_MAX, Verdict, WINDOW};
 pub(crate) use envelope::micros;
-pub use envelope::{CallEnvelope, ReplyEnvelope, append};
+pub use envelope::{CallEnvelope, ReplyEnvelope, TRANSIT_MAX, append};
 pub use error::{CallError, Fault};
 pub(crate) use link::is_to;
 pub use link::{CALLS_MAX, Link};

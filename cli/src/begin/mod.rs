@@ -1,0 +1,6 @@
+//! Commands to begin with: show a robot, make a module or its interface, check a configuration.
+
+pub(crate) mod check;
+pub(crate) mod demo;
+pub(crate) mod interface;
+pub(crate) mod new;

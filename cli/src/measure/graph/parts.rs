@@ -1,0 +1,109 @@
+//! The parts of a graph: modules, and edges with their content.
+
+use crate::look::observer::Silence;
+use rohrpost::output::plain;
+use rohrpost_launch::survey::Standing;
+use serde::Serialize;
+
+/// Modules and the edges between them.
+#[derive(Serialize)]
+pub(super) struct Graph {
+    pub(super) installation: String,
+    /// The node that the tool runs on.
+    pub(super) node: String,
+    /// The nodes that are shown.
+    pub(super) nodes: Vec<String>,
+    /// The shown nodes that do not answer.
+    pub(super) silent: Vec<Silence>,
+    /// The window of the rates.
+    pub(super) interval_s: f64,
+    pub(super) modules: Vec<Module>,
+    pub(super) edges: Vec<Edge>,
+}
+
+#[derive(Serialize)]
+pub(super) struct Module {
+    pub(super) module: String,
+    pub(super) node: String,
+    pub(super) aliases: Vec<String>,
+    pub(super) state: String,
+    pub(super) priority: u8,
+    /// It need not run.
+    #[serde(skip)]
+    pub(super) is_left_out: bool,
+}
+
+impl Module {
+    /// Whether no process of it is visible. Senders outside the configuration have no state.
+    pub(super) fn is_down(&self) -> bool {
+        let down = [Standing::Stopped, Standing::Unreachable];
+        down.iter().any(|standing| standing.word() == self.state)
+    }
+}
+
+/// The content of an edge.
+#[derive(Serialize, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Carries {
+    Data,
+    /// Records that a module reads where they were written.
+    Stream,
+    Command,
+    /// A command that every module understands.
+    Common,
+    Reply,
+    Output,
+}
+
+#[derive(Serialize)]
+pub(super) struct Edge {
+    pub(super) from: String,
+    pub(super) to: String,
+    pub(super) carries: Carries,
+    pub(super) what: String,
+    pub(super) packages: u64,
+    pub(super) packages_per_s: f64,
+    pub(super) bytes_per_s: f64,
+    pub(super) refused: u64,
+}
+
+impl Graph {
+    /// The nodes and edges of a drawing.
+    pub(super) fn title(&self) -> String {
+        let word = if self.nodes.len() == 1 { "node" } else { "nodes" };
+        format!("{word} {} of {}", self.nodes.join(", "), self.installation)
+    }
+
+    /// The text below a module's name: its node if there are several, its aliases.
+    pub(super) fn below<'a>(&'a self, module: &'a Module) -> impl Iterator<Item = String> + use<'a> {
+        let node = (self.nodes.len() > 1).then(|| format!("on {}", module.node));
+        node.into_iter().chain(module.aliases.iter().map(|alias| format!("+ {alias}")))
+    }
+
+    /// The edges that a drawing shows.
+    pub(super) fn drawn(&self, all: bool) -> impl Iterator<Item = &Edge> {
+        self.edges.iter().filter(move |edge| all || !matches!(edge.carries, Carries::Reply | Carries::Common))
+    }
+}
+
+impl Edge {
+    pub(super) fn add(&mut self, other: &Self) {
+        self.packages += other.packages;
+        self.packages_per_s += other.packages_per_s;
+        self.bytes_per_s += other.bytes_per_s;
+        self.refused += other.refused;
+    }
+
+    /// Its label in a drawing.
+    pub(super) fn label(&self) -> String {
+        format!("{} {}", plain::line(&self.what), self.rate())
+    }
+
+    pub(super) fn rate(&self) -> String {
+        match self.packages_per_s {
+            rate if rate < 0.95 => format!("{rate:.2}/s"),
+            rate if rate < 9.5 => format!("{rate:.1}/s"),
+            rate => format!("{rate:.0}/s"),
+        }
+    }
+}

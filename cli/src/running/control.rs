@@ -1,0 +1,204 @@
+//! `rohrpost restart`, `stop` and `start`: one module of a running node, through its launch.
+
+use crate::look::target::{Running, Target};
+use crate::terminal::{Failure, say};
+use rohrpost::output::plain;
+use rohrpost::{CallError, ToolLink};
+use rohrpost_launch::launcher::{AskLaunch, ChildState, ControlError, Phase};
+use rohrpost_launch::survey::Scope;
+use rohrpost_mailbox::{ModuleState, Name};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// Launch answers within this time: it waits for nobody.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// How often the progress is polled.
+const POLL: Duration = Duration::from_millis(20);
+/// Added to the module's own limits: time for a killed process to end, and for launch to notice.
+const MARGIN: Duration = Duration::from_secs(7);
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example: rohrpost restart pilot.0\nExit code 1: launch refused, or the module did not reach the \
+        state."
+)]
+pub(crate) struct Arguments {
+    /// Module, such as pilot.0.
+    name: String,
+    #[command(flatten)]
+    target: Target,
+    /// Return as soon as launch has accepted the order.
+    #[arg(long)]
+    no_wait: bool,
+    /// Timeout, seconds; without it, the time that the configuration gives the module to end and to get ready.
+    #[arg(long, value_name = "SECONDS", conflicts_with = "no_wait")]
+    timeout: Option<f64>,
+}
+
+/// What launch is asked for.
+#[derive(Clone, Copy)]
+pub(crate) enum Order {
+    Restart,
+    Stop,
+    Start,
+}
+
+pub(crate) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failure> {
+    let running = arguments.target.find()?;
+    let name = running.module(&arguments.name)?;
+    let module = running.installation.module(name).ok_or_else(|| {
+        format!("the configuration has no module `{}`; `rohrpost list` shows which there are", running.text(name))
+    })?;
+    let text = running.text(module.name);
+    let node = running.node_of(module.name);
+    let launcher = running.launcher_of(module.name).ok_or_else(|| format!("no node `{node}`"))?;
+    if running.is_own(module.name) && running.node.launcher().is_none() {
+        return Err(format!(
+            "no launch watches over {text}: node {} runs by hand. End the module's process and start it yourself, or \
+             launch the node: `rohrpost launch {}`",
+            running.node_name,
+            running.installation.path.display()
+        )
+        .into());
+    }
+    let timeout = match arguments.timeout {
+        Some(seconds) => crate::terminal::units::seconds(seconds)?,
+        None => module.stop_within + module.ready_within + MARGIN,
+    };
+    let tool = running.join(PATIENCE)?;
+    let began = Instant::now();
+    let mut asked = ModuleOrder { running: &running, name: module.name, text, launcher, tool, began, timeout };
+    let result = asked.carry_out(order, !arguments.no_wait);
+    asked.tool.close();
+    say(result?);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// An order, and the module it is about.
+struct ModuleOrder<'a> {
+    running: &'a Running,
+    name: Name,
+    text: String,
+    /// Launch of the module's node.
+    launcher: Name,
+    tool: ToolLink,
+    began: Instant,
+    timeout: Duration,
+}
+
+impl ModuleOrder<'_> {
+    /// The message after success.
+    fn carry_out(&mut self, order: Order, wait: bool) -> Result<String, Failure> {
+        let before = self.child()?.pid.map_or(String::new(), |pid| format!("; previously process {pid}"));
+        let text = self.text.clone();
+        let incarnation = match order {
+            Order::Restart => self.tool.restart(self.launcher, &text),
+            Order::Start => self.tool.start(self.launcher, &text),
+            Order::Stop => {
+                self.tool.stop(self.launcher, &text).map_err(|error| self.told(&error))?;
+                return if wait { self.wait_stopped() } else { Ok(format!("{text} is being stopped")) };
+            }
+        };
+        let incarnation = incarnation.map_err(|error| match &error {
+            CallError::Module(_, ControlError::Running(_)) => self.runs_already(),
+            error => self.told(error),
+        })?;
+        if wait { self.wait_running(incarnation, &before) } else { Ok(format!("{text} is being started")) }
+    }
+
+    fn wait_running(&mut self, incarnation: u32, before: &str) -> Result<String, Failure> {
+        loop {
+            let child = self.child()?;
+            let text = &self.text;
+            match child.phase {
+                Phase::Running if child.lives == incarnation => return self.at_work(&child, before),
+                Phase::Stopped => return Err(format!("another user has stopped {text} meanwhile").into()),
+                // It ran and ended, or could not even be started.
+                _ if child.lives > incarnation || child.lives == incarnation && child.phase == Phase::Waiting => {
+                    return Err(format!("{text} was started, and ended by itself: {}", child.last_end).into());
+                }
+                // It tries again, by its policy.
+                Phase::Waiting if child.lives < incarnation && child.attempt > 0 => {
+                    return Err(format!("{text} is not started: it {}; launch tries again", child.last_end).into());
+                }
+                Phase::Failed | Phase::Ended => return Err(format!("{text} does not run: {}", child.last_end).into()),
+                _ => self.pause(&child)?,
+            }
+        }
+    }
+
+    /// Its process runs, and was switched on if required. The module itself reports its state.
+    fn at_work(&mut self, child: &ChildState, before: &str) -> Result<String, Failure> {
+        let (text, pid, took_s) = (&self.text, child.pid.unwrap_or_default(), self.began.elapsed().as_secs_f64());
+        let survey = self.running.look(self.running.node_of(self.name), Scope::Module(self.name.raw()))?;
+        let process = survey.module(self.name).and_then(|module| module.process.as_ref());
+        let state = process.filter(|process| process.pid == pid).and_then(|process| process.state);
+        if state == Some(ModuleState::Error) {
+            let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
+            return Err(format!("{text} was started (process {pid}), but is in error: {}", plain::line(&why)).into());
+        }
+        let state = state.map_or("gone", ModuleState::name);
+        Ok(format!("{text} runs and is {state} after {took_s:.2} s (process {pid}{before})"))
+    }
+
+    /// Why it is not started, as `rohrpost list` and a call of it have it.
+    fn runs_already(&mut self) -> Failure {
+        let (text, running) = (&self.text, self.running);
+        let survey = running.look(running.node_of(self.name), Scope::Module(self.name.raw())).ok();
+        let module = survey.as_ref().and_then(|survey| survey.module(self.name));
+        let state = module.and_then(|module| module.process.as_ref()?.state);
+        match state {
+            Some(ModuleState::Error) => {
+                let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
+                format!(
+                    "{text} runs, but is in error: {}; `rohrpost call {text} on` tries again, `rohrpost restart \
+                     {text}` starts it anew",
+                    plain::line(&why)
+                )
+            }
+            Some(ModuleState::Off) => {
+                format!("{text} runs already, and is off; `rohrpost call {text} on` switches it on")
+            }
+            Some(ModuleState::Starting) => format!("{text} is starting already"),
+            _ => ControlError::Running(text.clone()).to_string(),
+        }
+        .into()
+    }
+
+    fn wait_stopped(&mut self) -> Result<String, Failure> {
+        loop {
+            let child = self.child()?;
+            match child.phase {
+                Phase::Stopping => self.pause(&child)?,
+                phase if phase.is_over() => {
+                    let (text, how) = (&self.text, child.last_end.lines().next().unwrap_or("it never ran"));
+                    return Ok(format!("{text} is stopped ({how}); `rohrpost start {text}` starts it"));
+                }
+                _ => return Err(format!("another user has started {} again meanwhile", self.text).into()),
+            }
+        }
+    }
+
+    fn pause(&self, child: &ChildState) -> Result<(), Failure> {
+        if self.began.elapsed() < self.timeout {
+            std::thread::sleep(POLL);
+            return Ok(());
+        }
+        let (text, phase, within) = (&self.text, child.phase.name(), self.timeout);
+        Err(format!("{text} is still {phase} after {within:?}; launch goes on with it, see `rohrpost list`").into())
+    }
+
+    /// Launch's record of the module.
+    fn child(&mut self) -> Result<ChildState, Failure> {
+        let children = self.tool.children(self.launcher).map_err(|error| self.told(&error.widen()))?;
+        let child = children.into_iter().find(|child| child.module == self.text);
+        child.ok_or_else(|| ControlError::NoModule(self.text.clone()).into())
+    }
+
+    /// Lower layers know launch only by its number.
+    fn told(&self, error: &CallError<ControlError>) -> Failure {
+        let node = self.running.node_of(self.name);
+        let launch = if self.running.is_own(self.name) { "launch".into() } else { format!("launch of node {node}") };
+        plain::line(&error.to_string().replace(&self.launcher.to_string(), &launch)).into()
+    }
+}
