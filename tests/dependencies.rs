@@ -208,6 +208,25 @@ fn the_picture_of_the_crates_is_what_their_manifests_say() {
     assert_eq!(drawn.collect::<BTreeMap<_, _>>(), said, "left: ARCHITECTURE.md, right: the manifests");
 }
 
+/// Where a newcomer looks first: short, with each package, and with no folder that there is not.
+#[test]
+fn the_map_is_short_and_has_each_package() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = std::fs::read_to_string(root.join("ARCHITECTURE.md")).unwrap();
+    let words = page.split_whitespace().count();
+    assert!(words <= 3000, "ARCHITECTURE.md has {words} words; what is over 3 000 belongs in the book");
+    let rows = page.split_once("| folder | what | invariant |\n").unwrap().1.lines().skip(1);
+    let rows: Vec<_> = rows.take_while(|line| line.starts_with('|')).collect();
+    let folder = |row: &&str| row.strip_prefix("| `")?.split_once("/` |").map(|(folder, _)| folder.to_owned());
+    let folders: BTreeSet<String> = rows.iter().filter_map(folder).collect();
+    assert_eq!(folders.len(), rows.len(), "a row begins with a folder, which stands there once");
+    let missing: Vec<_> = folders.iter().filter(|folder| !root.join(folder).is_dir()).collect();
+    assert!(missing.is_empty(), "ARCHITECTURE.md has rows for folders that there are not: {missing:?}");
+    let untold: Vec<_> = packages().into_iter().map(|it| if it == "." { "src".into() } else { it }).collect();
+    let untold: Vec<_> = untold.iter().filter(|package| !folders.contains(*package)).collect();
+    assert!(untold.is_empty(), "ARCHITECTURE.md has no row for these packages: {untold:?}");
+}
+
 /// Each package's `Cargo.toml` has a true description; public ones must have one.
 #[test]
 fn each_package_says_what_it_is() {

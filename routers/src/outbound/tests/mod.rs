@@ -1,3 +1,5 @@
+//! What a sending end lets go, when, and in which order; flows and time slots have files of their own.
+
 use super::*;
 use crate::counts::Cause;
 use crate::frame::{Alive, Frame};
