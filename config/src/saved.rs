@@ -11,7 +11,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, ValueDeserializer};
+use toml::de::{DeInteger, DeTable, DeValue, ValueDeserializer};
 
 /// A file of saved values, a table for each module: `["pilot.0"]`, and below it `cruise-m-s = 0.4`. The modules check
 /// types and ranges.
@@ -190,6 +190,12 @@ impl<'s> SavedDocument<'s> {
     }
 }
 
+/// Whether a parameter could hold an integer. The parser leaves that to who reads its value.
+fn is_in_range(number: &DeInteger<'_>) -> bool {
+    let (digits, radix) = (number.as_str(), number.radix());
+    i64::from_str_radix(digits, radix).is_ok() || u64::from_str_radix(digits, radix).is_ok()
+}
+
 /// The module of these values, one of `own`; none after an error that was reported.
 fn owner(item: &Item<'_>, installation: &Installation, own: &[String]) -> Option<Name> {
     let text = item.key.as_str();
@@ -214,6 +220,9 @@ fn owner(item: &Item<'_>, installation: &Installation, own: &[String]) -> Option
     for value in values.entries() {
         if matches!(value.value.get_ref(), DeValue::Array(_) | DeValue::Table(_) | DeValue::Datetime(_)) {
             value.report(format!("`{}`: a parameter is a number, a text, true or false", value.key));
+        }
+        if matches!(value.value.get_ref(), DeValue::Integer(number) if !is_in_range(number)) {
+            value.report(format!("`{}`: an integer has a digit, and is {} to {}", value.key, i64::MIN, u64::MAX));
         }
     }
     name

@@ -80,6 +80,11 @@ fn mistakes_in_the_file_are_told_by_line() {
         ("[\"pilot.0\"]\na = [1]", "tuned.toml:2: [\"pilot.0\"]: `a`: a parameter is a number, a text, true or false"),
         ("[\"pilot.0\"]\na = 1979-05-27", "tuned.toml:2: [\"pilot.0\"]: `a`: a parameter is a number"),
         ("[\"pilot.0\"]\na = { b = 1 }", "tuned.toml:2: [\"pilot.0\"]: `a`: a parameter is a number"),
+        (
+            "[\"pilot.0\"]\na = 0x",
+            "tuned.toml:2: [\"pilot.0\"]: `a`: an integer has a digit, and is -9223372036854775808 to",
+        ),
+        ("[\"pilot.0\"]\na = 18446744073709551616", "tuned.toml:2: [\"pilot.0\"]: `a`: an integer has a digit"),
         ("[\"pilot.0\"]\na = 1\na = 2", "tuned.toml:3: `a` is given twice; drop one of them"),
         ("[\"pilot.0\"]\na = = 1", "tuned.toml:2: this is no TOML: "),
         ("\0", "tuned.toml:1: this is no TOML: "),

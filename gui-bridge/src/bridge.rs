@@ -166,6 +166,7 @@ impl<V: Views> Module for Bridge<V> {
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         self.look_whether_time_began(context);
         self.nodes.collect(context);
+        self.subjects.collect(context);
         if let Some(scene) = &mut self.scene {
             self.subjects.look(scene, context);
         }

@@ -33,6 +33,8 @@ struct Entry {
     answered: bool,
     /// It is on another node, and being asked.
     asking: Option<DescriptionRequest>,
+    /// What it has answered; [`Subjects::find`] takes it.
+    heard: Option<Description>,
 }
 
 /// Data that are drawn.
@@ -99,6 +101,7 @@ impl Subjects {
             rate: show.rate.and_then(|rate_hz| Rate::hz(rate_hz).ok()),
             answered: false,
             asking: None,
+            heard: None,
         };
         let mut entries: Vec<Entry> = installation.gui.show.iter().map(entry).collect();
         if let Some(class) = installation.classes.id(CollectorInterface::CLASS) {
@@ -111,6 +114,7 @@ impl Subjects {
                     rate: None,
                     answered: false,
                     asking: None,
+                    heard: None,
                 });
             }
         }
@@ -126,14 +130,25 @@ impl Subjects {
         let told = told.iter().filter(|(_, is_there)| *is_there).map(|(data, _)| *data);
         for (router, data) in routers.flat_map(|router| told.clone().map(move |data| (router, data))) {
             let (module, data) = (text(router), Some(data.into()));
-            entries.push(Entry { from: router, module, data, rate: None, answered: false, asking: None });
+            entries.push(Entry { from: router, module, data, rate: None, answered: false, asking: None, heard: None });
         }
         for client in installation.nodes.iter().filter_map(|node| installation.tcp_client_of(&node.name)) {
             let (module, data) = (text(client), Some("link".into()));
-            entries.push(Entry { from: client, module, data, rate: None, answered: false, asking: None });
+            entries.push(Entry { from: client, module, data, rate: None, answered: false, asking: None, heard: None });
         }
         let views = own.into_iter().chain(views::built_in()).collect();
         Self { views, entries, subjects: Vec::new(), intake }
+    }
+
+    /// Takes what modules of other nodes have answered, and asks at once for their next parts: a long description has
+    /// many, and a second's half between two of them is many seconds without a picture.
+    pub(crate) fn collect(&mut self, context: &Context) {
+        for entry in &mut self.entries {
+            let asking = entry.asking.as_mut().filter(|asking| asking.is_under_way());
+            if let Some(description) = asking.and_then(|asking| asking.poll(context, entry.from)) {
+                (entry.asking, entry.heard) = (None, Some(description));
+            }
+        }
     }
 
     /// Reads the descriptions that are missing of modules that run, and subscribes to what they tell; whether there is
@@ -152,7 +167,7 @@ impl Subjects {
             let is_own = node_of(context.installation(), entry.from) == Some(own);
             let description = match is_own {
                 true => noted(node, entry.from),
-                false => entry.asking.get_or_insert_default().poll(context, entry.from),
+                false => entry.heard.take().or_else(|| entry.asking.get_or_insert_default().poll(context, entry.from)),
             };
             let Some(description) = description else { continue };
             (entry.answered, entry.asking) = (true, None);

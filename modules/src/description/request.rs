@@ -30,6 +30,11 @@ pub struct DescriptionRequest {
 }
 
 impl DescriptionRequest {
+    /// Whether an answer is awaited. After a failure none is, until [`DescriptionRequest::poll`] asks anew.
+    pub fn is_under_way(&self) -> bool {
+        self.call.is_some()
+    }
+
     /// The description, when it is there. Asks for what is missing; after a failure, for all of it.
     pub fn poll(&mut self, context: &Context, module: Name) -> Option<Description> {
         let mut link = context.link().borrow_mut();
