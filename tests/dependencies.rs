@@ -208,7 +208,7 @@ fn the_picture_of_the_crates_is_what_their_manifests_say() {
     assert_eq!(drawn.collect::<BTreeMap<_, _>>(), said, "left: ARCHITECTURE.md, right: the manifests");
 }
 
-/// Where a newcomer looks first: short, with each package, and with no folder that there is not.
+/// Where a newcomer looks first: short, with each package, and it names no folder that does not exist.
 #[test]
 fn the_map_is_short_and_has_each_package() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

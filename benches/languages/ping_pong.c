@@ -1,4 +1,4 @@
-// Ping-pong by mailboxes in C, as `benches/src/harness/ping_pong.rs` plays it in Rust: the same messages and checks.
+// Ping-pong by mailboxes in C, as `benches/local/src/harness/ping_pong.rs` plays it in Rust: the same messages and checks.
 //
 // Arguments: ping or pong, bytes, messages, warm-up, pause before each (ns), cap (ms), file for samples; directory of
 // the node, blocking or spinning.

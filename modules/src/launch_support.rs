@@ -1,5 +1,5 @@
 //! What launch shares with the modules that it starts: their environment, the signals that end them, their lines of
-//! output, and how commands are taken. Not for people: launch is in another crate.
+//! output, and how commands are taken. Public only because launch is another crate; not for users.
 
 pub use crate::output::relay::{OutputProxy, Relay, WeakOutputProxy};
 pub use crate::output::trace::LINES_MAX as TRACE_LINES_MAX;

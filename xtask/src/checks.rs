@@ -63,7 +63,7 @@ const PRODUCT: [Stage; 2] = [
         run: || {
             let left_out = ["--exclude", BRIDGE, "--exclude", BENCH, "--exclude", LOOM];
             let most = [&["test", "--workspace", "--no-fail-fast"], &left_out[..]].concat();
-            parts::run("testing all but the GUI bridge and the bench", tests(&most))
+            parts::run("testing all but the GUI bridge and the bench with its peers", tests(&most))
         },
     },
     Stage {

@@ -29,9 +29,9 @@ cargo xtask demo [--no-gui] [ARGS...]
     Builds `rohrpost` and runs `rohrpost demo ARGS...`. The GUI bridge is built before, or, if the demo runs until
     Ctrl-C, beside it, and joins it; with --no-gui not at all.
 cargo xtask test [--all]
-    All tests that a change to the product may break. With --all also those of the bench and of the GUI bridge, the slot
-    core under ThreadSanitizer, instructions of the hot paths, a short run of the fuzz targets, and drawings with
-    Rerun's command line. Every stage runs, even if one failed; a table of stages, their times and processor times, and
+    All tests that a change to the product may break. With --all also those of the bench with its peers and of the GUI
+    bridge, the slot core under ThreadSanitizer, instructions of the hot paths, a short run of the fuzz targets, and
+    drawings with Rerun's command line. Every stage runs, even if one failed; a table of stages, their times and processor times, and
     what was skipped or repeated, comes last.
 cargo xtask ci
     Format, a build of all by clippy, then all tests with what was built.

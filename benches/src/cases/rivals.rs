@@ -1,4 +1,4 @@
-//! Contenders of ping-pong beside ours, besides the floors of `rohrpost bench local`.
+//! Contenders of ping-pong beside ours, in addition to the floors of `rohrpost bench local`.
 
 use crate::floors::{Queues, SlotEnd, SlotPair};
 use crate::peers::{Iceoryx, Waits, pair};

@@ -6,7 +6,7 @@ use std::path::Path;
 /// Lines that are printed at most.
 pub const LINES_MAX: usize = 40;
 /// How names of functions begin that are nobody's own.
-const OTHERS: [&str; 15] = [
+const OTHERS: [&str; 17] = [
     "std::",
     "<std::",
     "core::",
@@ -20,6 +20,8 @@ const OTHERS: [&str; 15] = [
     "rust_panic",
     "rohrpost_modules::",
     "<rohrpost_modules::",
+    "rohrpost_launch::",
+    "<rohrpost_launch::",
     "<unknown>",
     "start_thread",
 ];

@@ -99,6 +99,7 @@ impl ToolLink {
     ///
     /// # Errors
     /// See [`ClientError`]; [`CreateError::Owned`] while a launch of it runs.
+    #[doc(hidden)]
     pub fn join_as_launch(
         installation: &Installation,
         node: &Arc<Node>,

@@ -1,4 +1,4 @@
-//! Routers as modules: `router.0` between the nodes of a LAN, and `tcp.I`, the TCP router and its clients, beyond it.
+//! Routers as modules: `router.I` between the nodes of a LAN, and `tcp.I`, the TCP router and its clients, beyond it.
 //!
 //! The cores, threads and sockets are in `rohrpost-routers`, which knows no module. Here they are started from a
 //! configuration, and tell how they do as data that describes itself. Nothing here knows a command line or a terminal.
