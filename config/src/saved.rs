@@ -190,7 +190,7 @@ impl<'s> SavedDocument<'s> {
     }
 }
 
-/// Whether a parameter could hold an integer. The parser leaves that to who reads its value.
+/// Whether a parameter could hold an integer, which the parser has not looked at yet.
 fn is_in_range(number: &DeInteger<'_>) -> bool {
     let (digits, radix) = (number.as_str(), number.radix());
     i64::from_str_radix(digits, radix).is_ok() || u64::from_str_radix(digits, radix).is_ok()

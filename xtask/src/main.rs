@@ -31,8 +31,8 @@ cargo xtask demo [--no-gui] [ARGS...]
 cargo xtask test [--all]
     All tests that a change to the product may break. With --all also those of the bench with its peers and of the GUI
     bridge, the slot core under ThreadSanitizer, instructions of the hot paths, a short run of the fuzz targets, and
-    drawings with Rerun's command line. Every stage runs, even if one failed; a table of stages, their times and processor times, and
-    what was skipped or repeated, comes last.
+    drawings with Rerun's command line. Every stage runs, even if one failed; a table of stages, their times and
+    processor times, and what was skipped or repeated, comes last.
 cargo xtask ci
     Format, a build of all by clippy, then all tests with what was built.
 cargo xtask fuzz [TARGET...] [--seconds N] | --short
