@@ -15,7 +15,6 @@ mod computer;
 mod daemons;
 mod exact;
 mod launch;
-mod logd;
 mod look;
 mod manager;
 mod measure;

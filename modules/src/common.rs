@@ -1,7 +1,7 @@
 //! The functions that every module has (seed 002, 2.2.1), numbers 1 to 15 of the commands.
 
 use crate::parameter::{Parameter, Refusal};
-use rohrpost_mailbox::{ModuleState, SystemClock, TimeSource};
+use rohrpost_mailbox::{LAYOUT_VERSION, ModuleState, SystemClock, TimeSource};
 use rohrpost_schema::{Data, Schema};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,12 @@ pub const FIRST_OWN: u16 = 16;
 
 /// Hash that commands to the common functions carry, which are of no interface: raised whenever one of them changes.
 pub const HASH: u32 = 4;
+
+/// The version of this program, and those of what programs of one node have to have in common.
+pub fn versions() -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    format!("{version} (layout of shared memory {LAYOUT_VERSION}, common functions {HASH})")
+}
 
 /// Bytes of a description that go into one reply, so that it fits every reply mailbox.
 pub const DESCRIPTION_PART: usize = 768;

@@ -1,7 +1,6 @@
 //! `rohrpost run`: runs a built-in module, started by launch or by hand.
 
 use crate::terminal::Failure;
-use crate::{logd, replay};
 use rohrpost::Start;
 use rohrpost_config::{BUILTINS, RECORDER, REPLAY};
 use rohrpost_modules::runtime::exit;
@@ -26,10 +25,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
     };
     if arguments.builtin == RECORDER {
         // Not with the others: the author of a module does not compile what it needs.
-        return Ok(exit(logd::run(start)));
+        return Ok(exit(rohrpost_recorder::run_recorder(start)));
     }
     if arguments.builtin == REPLAY {
-        return Ok(exit(replay::play(start)));
+        return Ok(exit(rohrpost_recorder::run_player(start)));
     }
     match rohrpost_builtin::run(&arguments.builtin, start) {
         Some(result) => Ok(exit(result)),

@@ -20,13 +20,7 @@ pub(crate) struct Arguments {
 /// The text of `--version` after the program's name.
 pub(crate) fn text() -> &'static str {
     static TEXT: OnceLock<String> = OnceLock::new();
-    TEXT.get_or_init(|| {
-        format!(
-            "{} (layout of shared memory {LAYOUT_VERSION}, common functions {})",
-            env!("CARGO_PKG_VERSION"),
-            common::HASH
-        )
-    })
+    TEXT.get_or_init(common::versions)
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {

@@ -4,68 +4,53 @@ use super::journals;
 use crate::terminal::{Failure, complain};
 use rohrpost_config::{Installation, Module};
 use rohrpost_mailbox::Name;
-use rohrpost_modules::journal::NotedAnswer;
+use rohrpost_recorder::player::JournalAnswers;
 use rohrpost_recording::Info;
-use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Of all answers together.
 const ANSWERS_BYTES_MAX: usize = 64 << 20;
 
-/// What modules have answered.
-#[derive(Default, Serialize, Deserialize)]
-pub(crate) struct JournalAnswers {
-    /// Names of modules of which the files have a journal, from its beginning on.
-    pub(crate) names: BTreeSet<String>,
-    /// Names of modules of which a journal cannot be read, and why.
-    pub(crate) unreadable: BTreeMap<String, String>,
-    /// Names under which commands came, in the order of each journal.
-    pub(crate) answers: Vec<(String, NotedAnswer)>,
-}
-
-impl JournalAnswers {
-    /// Of these modules of an installation, in files that follow one another. Their journals are put together in a
-    /// folder of their own within this one, and removed.
-    pub(crate) fn read(
-        files: &[Info],
-        (installation, modules): (&Installation, &[String]),
-        folder: &Path,
-    ) -> Result<Self, Failure> {
-        let folder = tempfile::tempdir_in(folder)?;
-        let (mut all, mut room) = (Self::default(), Some(ANSWERS_BYTES_MAX));
-        for run in journals::of_files(files, modules, folder.path())? {
-            let exact = run.exact();
-            let (installation, module) = match run.readable(&exact) {
-                Ok(recorded) => recorded,
-                Err(why) => {
-                    let name = installation.classes.parse_module(&run.module);
-                    let mut names = name.map_or(Vec::new(), |name| names_of(installation, name));
-                    // As the journal's channel has it, whatever the configuration has.
-                    names.push(run.module);
-                    all.unreadable.extend(names.into_iter().map(|name| (name, why.clone())));
-                    continue;
-                }
-            };
-            let names = names_of(&installation, module);
-            exact.each_answer(|answer| {
-                let Some(name) = names.get(usize::from(answer.endpoint)) else { return true };
-                room = room.and_then(|room| room.checked_sub(answer.bytes() + name.len()));
-                if room.is_some() {
-                    all.answers.push((name.clone(), answer));
-                }
-                room.is_some()
-            })?;
-            all.names.extend(names);
-        }
-        if room.is_none() {
-            complain(format_args!(
-                "the answers to commands are more than {} MiB: those behind that are not played",
-                ANSWERS_BYTES_MAX >> 20
-            ));
-        }
-        Ok(all)
+/// Of these modules of an installation, in files that follow one another. Their journals are put together in a
+/// folder of their own within this one, and removed.
+pub(crate) fn read_answers(
+    files: &[Info],
+    (installation, modules): (&Installation, &[String]),
+    folder: &Path,
+) -> Result<JournalAnswers, Failure> {
+    let folder = tempfile::tempdir_in(folder)?;
+    let (mut all, mut room) = (JournalAnswers::default(), Some(ANSWERS_BYTES_MAX));
+    for run in journals::of_files(files, modules, folder.path())? {
+        let exact = run.exact();
+        let (installation, module) = match run.readable(&exact) {
+            Ok(recorded) => recorded,
+            Err(why) => {
+                let name = installation.classes.parse_module(&run.module);
+                let mut names = name.map_or(Vec::new(), |name| names_of(installation, name));
+                // As the journal's channel has it, whatever the configuration has.
+                names.push(run.module);
+                all.unreadable.extend(names.into_iter().map(|name| (name, why.clone())));
+                continue;
+            }
+        };
+        let names = names_of(&installation, module);
+        exact.each_answer(|answer| {
+            let Some(name) = names.get(usize::from(answer.endpoint)) else { return true };
+            room = room.and_then(|room| room.checked_sub(answer.bytes() + name.len()));
+            if room.is_some() {
+                all.answers.push((name.clone(), answer));
+            }
+            room.is_some()
+        })?;
+        all.names.extend(names);
     }
+    if room.is_none() {
+        complain(format_args!(
+            "the answers to commands are more than {} MiB: those behind that are not played",
+            ANSWERS_BYTES_MAX >> 20
+        ));
+    }
+    Ok(all)
 }
 
 /// All names of a module, its own first.
@@ -122,7 +107,7 @@ program = "motor"
             let folder = tempfile::tempdir().unwrap();
             recorded(folder.path(), module, offset);
             let file = info(&folder.path().join("base-0001.mcap")).unwrap();
-            let read = JournalAnswers::read(&[file], (&installation, &[]), folder.path()).unwrap();
+            let read = read_answers(&[file], (&installation, &[]), folder.path()).unwrap();
             assert!(read.names.is_empty() && read.answers.is_empty());
             assert!(read.unreadable.keys().eq(names), "{:?}", read.unreadable);
             assert!(read.unreadable.values().all(|told| told.contains(why)), "{:?}", read.unreadable);

@@ -20,7 +20,7 @@ use crate::begin::demo::Folder;
 use crate::command_line::command_line;
 use crate::quota::UnpackedQuota;
 use crate::terminal::{Failure, complain, say};
-pub(super) use answers::JournalAnswers;
+pub(super) use answers::read_answers;
 use consent::LocalConfiguration;
 use journals::RecordedRun;
 use program::ExactPrograms;

@@ -6,25 +6,20 @@
 //!                                                                              └─ modules that run: --run
 //! ```
 
-mod answers;
 #[cfg(test)]
 mod asking_tests;
-mod channels;
 mod configuration;
-mod course;
 mod others;
 mod permitted;
-mod player;
 mod recorded;
 mod session;
 mod settings;
 mod sizes;
-mod spacing;
 mod tables;
 
 use crate::begin::check;
 use crate::begin::demo::{Folder, drawing, drawn, is_built_in, write_map};
-use crate::exact::{self, ExactArguments, ExactProgram, JournalAnswers};
+use crate::exact::{self, ExactArguments, ExactProgram};
 use crate::launch::end;
 use crate::quota::check_shared;
 use crate::record::PartArguments;
@@ -33,13 +28,13 @@ use crate::terminal::{Failure, complain, say};
 use configuration::{NODE, PlayedModules, ReplayWish, saved_of};
 use others::IntoStream;
 use permitted::ReplayDrawing;
-pub(crate) use player::run as play;
 use recorded::RecordedFiles;
 use rohrpost::output::plain;
 use rohrpost::schema::Description;
 use rohrpost::wire::append;
 use rohrpost_config::{Installation, StreamSpec};
 use rohrpost_launch::{Launch, events};
+use rohrpost_recorder::player::RATE_MAX;
 use session::ReplaySession;
 use settings::WantedCourse;
 use std::collections::BTreeSet;
@@ -56,7 +51,7 @@ const ANSWERS: &str = "answers";
 /// The file that the GUI writes.
 const DRAWING: &str = "rohrpost-replay.rrd";
 /// The largest rate: that of a node's time.
-const RATES: std::ops::RangeInclusive<f64> = 0.001..=player::RATE_MAX;
+const RATES: std::ops::RangeInclusive<f64> = 0.001..=RATE_MAX;
 
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("runs").args(["exact", "run"]))]
@@ -349,6 +344,6 @@ fn noted_answers(
         return Ok(None);
     }
     let mut bytes = Vec::new();
-    append(&mut bytes, &JournalAnswers::read(&recorded.infos, (source, &modules), folder)?)?;
+    append(&mut bytes, &exact::read_answers(&recorded.infos, (source, &modules), folder)?)?;
     Ok(Some(bytes))
 }

@@ -10,11 +10,18 @@
 //!
 //! The timer goes by the computer's clock, since a module has no ticks while the node's time stands still.
 
-use super::answers::PlayedAnswers;
-use super::channels::PlayedChannels;
-use super::course::{Course, Move, Part};
-use super::settings::{PlayerSettings, ROUND_MIN};
-use super::spacing::{PlayedAt, ProcessorWaits, Spacing};
+mod answers;
+mod channels;
+mod course;
+mod settings;
+mod spacing;
+
+pub use answers::JournalAnswers;
+pub use settings::{ROUND_MIN, RecordingPath};
+
+use answers::PlayedAnswers;
+use channels::PlayedChannels;
+use course::{Course, Move, Part};
 use nix::sys::time::TimeSpec;
 use nix::sys::timer::{Expiration, TimerSetTimeFlags};
 use nix::sys::timerfd::{ClockId, TimerFd, TimerFlags};
@@ -27,6 +34,8 @@ use rohrpost::{
 };
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_recording::{Player, RecordedChannel};
+use settings::PlayerSettings;
+use spacing::{PlayedAt, ProcessorWaits, Spacing};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -40,9 +49,13 @@ const TOLD: Duration = Duration::from_millis(200);
 /// The timer's shortest time; none would switch it off.
 const SOON: Duration = Duration::from_nanos(1);
 /// The largest rate: that of a node's time.
-pub(super) const RATE_MAX: f64 = 1000.0;
+pub const RATE_MAX: f64 = 1000.0;
 
-pub(crate) fn run(start: Start) -> Result<(), StartError> {
+/// Runs the player of a replay, until it is told to end.
+///
+/// # Errors
+/// See [`StartError`].
+pub fn run(start: Start) -> Result<(), StartError> {
     rohrpost_modules::runtime::run_started::<RecordingPlayer>(start)
 }
 

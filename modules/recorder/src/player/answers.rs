@@ -1,11 +1,22 @@
 //! Answers of modules that are played: those that were recorded for the same commands.
 
-use crate::exact::JournalAnswers;
 use rohrpost::Fault;
 use rohrpost::interface::StandInCommand;
 use rohrpost::output::plain::line;
 use rohrpost_modules::journal::{NotedAnswer, NotedOutcome};
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// What modules have answered.
+#[derive(Default, Serialize, Deserialize)]
+pub struct JournalAnswers {
+    /// Names of modules of which the files have a journal, from its beginning on.
+    pub names: BTreeSet<String>,
+    /// Names of modules of which a journal cannot be read, and why.
+    pub unreadable: BTreeMap<String, String>,
+    /// Names under which commands came, in the order of each journal.
+    pub answers: Vec<(String, NotedAnswer)>,
+}
 
 /// A command: to which name, which function, and with which arguments.
 type CommandKey = (String, u16, Vec<u8>);

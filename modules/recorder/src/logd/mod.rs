@@ -22,7 +22,6 @@ mod sampler;
 mod tap;
 mod taps;
 
-use crate::computer::version;
 use control::{ControlServer, Orders, Told};
 use earlier::EarlierFiles;
 use health::Health;
@@ -47,7 +46,11 @@ const PAGE_BYTES: usize = 2500;
 /// Most bytes that a channel has besides its topic: the topic's length, two counts, and one for each cause of losses.
 const NUMBERS_BYTES: usize = 2 + 10 + 10 + LossCause::ALL.len() * 10;
 
-pub(super) fn run(start: Start) -> Result<(), StartError> {
+/// Runs the recorder of a node, until it is told to end.
+///
+/// # Errors
+/// See [`StartError`].
+pub fn run(start: Start) -> Result<(), StartError> {
     rohrpost_modules::runtime::run_started::<Logd>(start)
 }
 
@@ -281,7 +284,7 @@ fn session(installation: &Installation, node: &str) -> Session {
     // Without such a file there is nothing to say of it; that it cannot be read, was said at the start.
     let saved = installation.parameters.as_ref().and_then(|path| Some((path, std::fs::read_to_string(path).ok()?)));
     configuration.extend(saved.map(|(path, text)| (file_name(path), text)));
-    let versions = BTreeMap::from([("rohrpost".to_owned(), version::text().to_owned())]);
+    let versions = BTreeMap::from([("rohrpost".to_owned(), rohrpost::common::versions())]);
     Session { node: node.into(), versions, configuration }
 }
 
