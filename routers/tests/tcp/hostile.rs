@@ -123,9 +123,7 @@ fn hello(incarnation: u64) -> Vec<u8> {
     let (reaches_own, attempt, asked_ns, name) = (false, 1, 0, "hostile");
     let hello =
         SessionHello { system, reaches_own, common: COMMON, system_digest, incarnation, attempt, asked_ns, name };
-    let mut bytes = Vec::new();
-    SessionMessage::Hello(hello).write(&mut bytes);
-    bytes
+    SessionMessage::Hello(hello).to_bytes()
 }
 
 /// What a client may say, or nearly.

@@ -36,15 +36,12 @@ impl Raw {
     }
 
     pub(crate) fn say(&mut self, message: &SessionMessage<'_>) {
-        let mut bytes = Vec::new();
-        message.write(&mut bytes);
-        self.0.write_all(&bytes).unwrap();
+        self.0.write_all(&message.to_bytes()).unwrap();
     }
 
     pub(crate) fn hosts(&mut self, system: u8) {
         let range = Range { first: module(system), last: module(system).with_local(255) };
-        let mut bytes = Vec::new();
-        self.say(&SessionMessage::Register(Ranges::new(1, &[range], &mut bytes)));
+        self.say(&SessionMessage::Register(Ranges::new(1, &[range], &mut Vec::new())));
     }
 
     /// Reads until the connection is closed; what came.
