@@ -99,7 +99,7 @@ fn parts_take_nothing_from_the_heap() {
             let now_ns = MS + number;
             writer.write(Stamp { epoch: 1, ns: 1 + number }, &body).unwrap();
             here.refresh(now_ns);
-            while let Some((kind, length)) = here.next(now_ns, LAPTOP, &mut content) {
+            while let Some((kind, length)) = here.next_before(now_ns, (LAPTOP, u8::MAX), &mut content) {
                 there.take(now_ns, (Some(SERVER), 1), &read(kind, &content[..length]));
             }
             let Next::Record(record) = reader.try_next().unwrap() else { panic!("record {number} is not there") };

@@ -112,8 +112,7 @@ impl Case {
     }
 
     fn feed(&mut self, message: &SessionMessage<'_>) {
-        let mut bytes = Vec::new();
-        message.write(&mut bytes);
+        let bytes = message.to_bytes();
         self.steps.push(format!("{{\"frame\": \"{}\", \"server\": {}}}", hex(&bytes), self.server));
         let (head, rest) = bytes.split_first_chunk().unwrap();
         let head = SessionFrameHead::parse(head, rest.len()).unwrap();

@@ -9,7 +9,7 @@ use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;
 use rohrpost_routers::session::client::{Client, ClientEvent, ClientHost, ClientPackage, ClientSettings, ClientStep};
 use rohrpost_routers::session::frame::{Carried, Range};
-use rohrpost_routers::session::{Cause, ErrorReplies, ReplicaEnd};
+use rohrpost_routers::session::{Cause, EndHost};
 use rohrpost_routers::tcp::{ClientSeal, Moved, Stream};
 use std::net::SocketAddr;
 
@@ -191,9 +191,7 @@ struct Inbox<'a> {
     wrong: Option<Failure>,
 }
 
-impl ReplicaEnd for Inbox<'_> {}
-
-impl ErrorReplies for Inbox<'_> {
+impl EndHost for Inbox<'_> {
     fn answer(&mut self, _: &[u8], _: Cause, _: Option<&str>, _: &mut Vec<u8>) -> bool {
         false
     }

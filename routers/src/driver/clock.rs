@@ -271,7 +271,7 @@ impl Seals {
     ) -> Result<OpenedFrame<'a>, Told> {
         let is_there = |from| node == Some(from);
         let opened = if overhears && self.opening.is_strange(datagram) {
-            self.opening.overhear_from(datagram, is_there).map(|(head, text)| (head, text, false))
+            self.opening.overhear(datagram, is_there).map(|(head, text)| (head, text, false))
         } else {
             match self.opening.open_from(datagram, is_there) {
                 Ok(Opened::Frame(head, text)) => Ok((head, text, true)),

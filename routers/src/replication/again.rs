@@ -15,6 +15,7 @@ pub(super) struct AskedPart {
 }
 
 /// Room for one record at a time.
+#[derive(Default)]
 pub(super) struct Again {
     record: Option<RecordInfo>,
     /// What was sampled out before it.
@@ -30,7 +31,7 @@ pub(super) struct Again {
 impl Again {
     /// Room for a record of so many parts.
     pub(super) fn new(parts: usize) -> Self {
-        Self { record: None, sampled: 0, wanted: vec![0; parts.div_ceil(64)].into(), left: 0, budget: 0 }
+        Self { wanted: vec![0; parts.div_ceil(64)].into(), ..Self::default() }
     }
 
     /// Begins with a record. `sampled`: what was sampled out before it.

@@ -1,7 +1,7 @@
 //! Streams of this node that others have, by importance and in turn.
 
 use super::outgoing::OutgoingReplica;
-use super::peers::Peers;
+use crate::frame::NodeIndex;
 use rohrpost_network::LEVELS;
 
 /// Streams, the most important first; those of one level in turn, record by record.
@@ -17,22 +17,17 @@ impl StreamsByLevel {
         Self { streams, turns: [0; LEVELS] }
     }
 
-    /// Looks for newer records, and which nodes are there.
-    pub(super) fn refresh(&mut self, now_ns: u64, peers: &impl Peers) {
+    /// Looks for newer records, and which nodes are there. `peers`: see [`OutgoingReplica::meet`].
+    pub(super) fn refresh(&mut self, now_ns: u64, peers: impl Fn(NodeIndex) -> (u64, bool)) {
         for stream in &mut self.streams {
             stream.refresh();
-            stream.meet(now_ns, peers);
+            stream.meet(now_ns, &peers);
         }
     }
 
-    /// A stream and one of its destinations that have something for a ready peer: of the most important level, and
-    /// there in turn.
-    pub(super) fn choose(&mut self, now_ns: u64, ready: u64) -> Option<(usize, usize)> {
-        self.choose_before(now_ns, ready, LEVELS as u8)
-    }
-
-    /// The same of streams that are more important than this level.
-    pub(super) fn choose_before(&mut self, now_ns: u64, ready: u64, before: u8) -> Option<(usize, usize)> {
+    /// A stream and one of its destinations that have something for a ready peer: of the most important level `before`
+    /// this one, and there in turn.
+    pub(super) fn choose(&mut self, now_ns: u64, ready: u64, before: u8) -> Option<(usize, usize)> {
         let mut begin = 0;
         for level in self.streams.chunk_by_mut(|a, b| a.settings.level == b.settings.level) {
             if level[0].settings.level >= before {

@@ -61,7 +61,7 @@ impl ReplicaLosses {
 }
 
 /// A replica that is sent to a node.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct SentReplica {
     /// Its place in the configuration.
     pub place: u16,
@@ -79,13 +79,12 @@ pub struct SentReplica {
 
 impl SentReplica {
     pub(super) fn new(place: u16, to: NodeIndex) -> Self {
-        let (records, bytes, again, lost) = <(Count, Count, Count, ReplicaLosses)>::default();
-        Self { place, to, records, bytes, again, lost }
+        Self { place, to, ..Self::default() }
     }
 }
 
 /// A replica that this node has.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct ReceivedReplica {
     /// Its place in the configuration.
     pub place: u16,
@@ -110,9 +109,7 @@ pub struct ReceivedReplica {
 
 impl ReceivedReplica {
     pub(super) fn new(place: u16) -> Self {
-        let (records, bytes, gaps, asked, completed, delayed) = Default::default();
-        let (delay, lost) = <(Latencies, ReplicaLosses)>::default();
-        Self { place, records, bytes, gaps, asked, completed, delay, delayed, lost }
+        Self { place, ..Self::default() }
     }
 }
 

@@ -16,6 +16,7 @@ pub(super) const UNCHANGED_EVERY_NS: u64 = 10_000_000_000;
 const ASKED_MAX: usize = 32;
 
 /// A node that has the replica.
+#[derive(Default)]
 pub(super) struct Destination {
     pub(super) peer: NodeIndex,
     pub(super) counts: Arc<SentReplica>,
@@ -57,32 +58,10 @@ pub(super) struct Destination {
 
 impl Destination {
     /// `parts`: most of a record.
-    pub(super) fn new(place: u16, peer: NodeIndex, parts: usize) -> Self {
-        Self {
-            peer,
-            counts: Arc::new(SentReplica::new(place, peer)),
-            by_line: false,
-            incarnation: 0,
-            next: None,
-            is_absent: true,
-            has_none: true,
-            under_way: None,
-            sent: None,
-            before: None,
-            sampled: 0,
-            left_out: None,
-            begun: [None; ASKED_MAX],
-            begins: 0,
-            again: std::array::from_fn(|_| Again::new(parts)),
-            sample_ns: 0,
-            describe_ns: 0,
-            describing: None,
-        }
-    }
-
-    /// The same by a line.
-    pub(super) fn by_line(self) -> Self {
-        Self { by_line: true, ..self }
+    pub(super) fn new(place: u16, peer: NodeIndex, parts: usize, by_line: bool) -> Self {
+        let counts = Arc::new(SentReplica::new(place, peer));
+        let again = std::array::from_fn(|_| Again::new(parts));
+        Self { peer, counts, by_line, is_absent: true, has_none: true, again, ..Self::default() }
     }
 
     /// Whether a record is under way; if none is, takes the next. `fingerprints`: only of those that changed.

@@ -64,6 +64,7 @@ impl Arriving {
 }
 
 /// Room for one record at a time.
+#[derive(Default)]
 pub(super) struct Gathering {
     is_open: bool,
     pub(super) sequence: u64,
@@ -102,28 +103,7 @@ pub(super) struct Gathering {
 impl Gathering {
     pub(super) fn new(replica: &ReplicaSettings, part_bytes: usize) -> Self {
         let parts = (replica.shape.record_bytes as usize).div_ceil(part_bytes);
-        Self {
-            is_open: false,
-            sequence: 0,
-            life: Life::default(),
-            arriving: None,
-            came: vec![0; parts.div_ceil(64)].into(),
-            parts: 0,
-            missing: 0,
-            expected: 0,
-            reached: 0,
-            gap_ns: 0,
-            is_passed: false,
-            came_ns: 0,
-            pace_ns: 0,
-            asked_ns: 0,
-            first_asked_ns: 0,
-            rounds: 0,
-            in_vain: 0,
-            was_asked: false,
-            is_due: false,
-            whole_ns: 0,
-        }
+        Self { came: vec![0; parts.div_ceil(64)].into(), ..Self::default() }
     }
 
     /// Opens it for a record of which nothing is known: its first part is asked for.
@@ -147,12 +127,10 @@ impl Gathering {
     }
 
     fn open(&mut self, now_ns: u64, sequence: u64, life: Life, parts: usize) {
-        (self.is_open, self.sequence, self.life, self.arriving) = (true, sequence, life, None);
-        self.came[..parts.div_ceil(64)].fill(0);
-        (self.parts, self.missing, self.expected) = (parts, parts, parts - 1);
-        (self.came_ns, self.pace_ns, self.asked_ns, self.first_asked_ns) = (now_ns, 0, 0, 0);
-        (self.reached, self.gap_ns, self.is_passed) = (0, 0, false);
-        (self.rounds, self.in_vain, self.was_asked, self.is_due, self.whole_ns) = (0, 0, false, false, 0);
+        let mut came = std::mem::take(&mut self.came);
+        came[..parts.div_ceil(64)].fill(0);
+        let (is_open, missing, expected, came_ns) = (true, parts, parts - 1, now_ns);
+        *self = Self { is_open, sequence, life, came, parts, missing, expected, came_ns, ..Self::default() };
     }
 
     pub(super) fn close(&mut self) {

@@ -85,7 +85,7 @@ pub(super) struct IncomingReplica {
 }
 
 impl IncomingReplica {
-    pub(super) fn new(place: u16, replica: &ReplicaSettings, part_bytes: usize) -> Self {
+    pub(super) fn new(place: u16, replica: &ReplicaSettings, part_bytes: usize, by_line: bool) -> Self {
         Self {
             place,
             settings: replica.clone(),
@@ -104,18 +104,13 @@ impl IncomingReplica {
             retry_ns: 0,
             open_ns: 0,
             describe_ns: 0,
-            by_line: false,
+            by_line,
             requests: None,
             has_asked: false,
             told: false,
             delays: DelayAlarm::default(),
             losses: LossAlarm::default(),
         }
-    }
-
-    /// The same by a line.
-    pub(super) fn by_line(self) -> Self {
-        Self { by_line: true, ..self }
     }
 
     /// How long a process of this node that has the registry is waited for.

@@ -13,14 +13,12 @@
 use super::by_level::StreamsByLevel;
 use super::counts::{ReplicaCounts, SentReplica};
 use super::outgoing::OutgoingReplica;
-use super::peers::Peers;
 use super::receiving::ReplicaReceiver;
 use super::settings::LineSettings;
 use super::{Describe, LINE_PART_BYTES, LINE_PART_ROOM, ReplicaSettings};
 use crate::counts::Count;
 use crate::frame::{FrameKind, NodeIndex, ReplicaFrame};
 use rohrpost_mailbox::{Name, Participant, StreamReader, SystemTime};
-use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 /// Modules that have begun are looked for this often, ns.
@@ -33,20 +31,14 @@ pub type TellsTime = Box<dyn Fn(u64) -> SystemTime + Send>;
 struct LineDestination {
     node: NodeIndex,
     streams: StreamsByLevel,
-    /// Counts its connections; 0: it is not there.
+    /// Counts its connections, which are its lives; 0: it is not there.
     connection: u64,
 }
 
-/// The connections of one node are its lives.
-struct Connection(u64);
-
-impl Peers for Connection {
-    fn incarnation_of(&self, _: NodeIndex) -> u64 {
-        self.0
-    }
-
-    fn is_there(&self, _: u64, _: NodeIndex) -> bool {
-        self.0 != 0
+impl LineDestination {
+    fn refresh(&mut self, now_ns: u64) {
+        let connection = self.connection;
+        self.streams.refresh(now_ns, |_| (connection, connection != 0));
     }
 }
 
@@ -76,8 +68,8 @@ impl LineReplicas {
         let all = settings.sent.iter().fold(0, |all, replica| all | replica.to);
         let to = |node: &NodeIndex| all & 1 << *node != 0;
         let destination = |node| LineDestination { node, streams: streams_to(node, &settings.sent), connection: 0 };
-        let receiver =
-            ReplicaReceiver::of_line(settings.own, &settings.received, participant.clone(), describe.clone());
+        let (own, way) = (settings.own, (LINE_PART_BYTES, true));
+        let receiver = ReplicaReceiver::of(own, way, &settings.received, participant.clone(), describe.clone());
         Self {
             server: settings.server,
             nodes: settings.nodes.clone(),
@@ -137,7 +129,7 @@ impl LineReplicas {
     fn set(&mut self, now_ns: u64, node: NodeIndex, connection: u64) {
         if let Some(destination) = self.destinations.iter_mut().find(|destination| destination.node == node) {
             destination.connection = connection;
-            destination.streams.refresh(now_ns, &Connection(connection));
+            destination.refresh(now_ns);
         }
     }
 
@@ -147,11 +139,15 @@ impl LineReplicas {
         if looks {
             self.look_ns = now_ns + LOOK_EVERY_NS;
         }
-        for LineDestination { streams, connection, .. } in &mut self.destinations {
+        for destination in &mut self.destinations {
             if looks {
-                streams.streams.iter_mut().for_each(|stream| stream.look(&self.participant, &*self.describe));
+                destination
+                    .streams
+                    .streams
+                    .iter_mut()
+                    .for_each(|stream| stream.look(&self.participant, &*self.describe));
             }
-            streams.refresh(now_ns, &Connection(*connection));
+            destination.refresh(now_ns);
         }
     }
 
@@ -170,15 +166,8 @@ impl LineReplicas {
         all.flat_map(|destination| &destination.streams.streams)
     }
 
-    /// Writes the next part for a node: its kind and length. None: there is none.
-    ///
-    /// # Panics
-    /// When `content` has less than [`LINE_PART_ROOM`] bytes.
-    pub fn next(&mut self, now_ns: u64, node: NodeIndex, content: &mut [u8]) -> Option<(FrameKind, usize)> {
-        self.next_before(now_ns, (node, LEVELS as u8), content)
-    }
-
-    /// The same of streams that are more important than this level.
+    /// Writes the next part for a node, of streams that are more important than this level: its kind and length. None:
+    /// there is none.
     ///
     /// # Panics
     /// When `content` has less than [`LINE_PART_ROOM`] bytes.
@@ -191,7 +180,7 @@ impl LineReplicas {
         let content = &mut content[..LINE_PART_ROOM];
         let destination = self.destinations.iter_mut().find(|destination| destination.node == node)?;
         loop {
-            let (at, to) = destination.streams.choose_before(now_ns, 1 << node, level)?;
+            let (at, to) = destination.streams.choose(now_ns, 1 << node, level)?;
             // What is held is there; but a stream that was made anew takes it along, and another one is chosen.
             let stream = &mut destination.streams.streams[at];
             if let Some(filled) = stream.fill(now_ns, &self.time, (to, LINE_PART_BYTES), content) {
@@ -213,5 +202,6 @@ impl LineReplicas {
 /// Of all replicas those that a node has by the line.
 fn streams_to(node: NodeIndex, replicas: &[ReplicaSettings]) -> StreamsByLevel {
     let own = (0..).zip(replicas).filter(|(_, replica)| replica.to & 1 << node != 0);
-    StreamsByLevel::new(own.map(|(place, replica)| OutgoingReplica::by_line(place, replica, node)).collect())
+    let stream = |of| OutgoingReplica::new(of, std::iter::once(node), LINE_PART_BYTES, true);
+    StreamsByLevel::new(own.map(stream).collect())
 }

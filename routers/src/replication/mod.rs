@@ -42,7 +42,6 @@ mod incoming;
 mod line;
 mod one_way;
 mod outgoing;
-mod peers;
 mod receiving;
 mod requests;
 mod sending;

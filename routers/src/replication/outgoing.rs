@@ -4,9 +4,8 @@ use super::counts::ReplicaLoss;
 use super::description::OwnDescription;
 use super::destination::Destination;
 use super::fingerprint::Fingerprints;
-use super::peers::Peers;
 use super::settings::ReplicaSettings;
-use super::{DESCRIBE_EVERY_NS, Describe, LINE_DESCRIBE_EVERY_NS, LINE_PART_BYTES};
+use super::{DESCRIBE_EVERY_NS, Describe, LINE_DESCRIBE_EVERY_NS};
 use crate::frame::{DESCRIPTION_BYTES_MAX, FrameKind, NodeIndex, PartRequest, RECORD_PART_HEAD_BYTES, RecordPart};
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Participant, RecordInfo, StreamId, StreamReader, SystemTime};
@@ -35,19 +34,20 @@ pub(super) struct OutgoingReplica {
 }
 
 impl OutgoingReplica {
-    /// For those of `peers` that have it.
+    /// For those of `peers` that have it. `by_line`: nothing is lost on the way to them, and records are held here until
+    /// they have left.
     pub(super) fn new(
-        place: u16,
-        replica: &ReplicaSettings,
+        (place, replica): (u16, &ReplicaSettings),
         peers: impl Iterator<Item = NodeIndex>,
         part_bytes: usize,
+        by_line: bool,
     ) -> Self {
         let peers = peers.filter(|peer| replica.to & 1 << peer != 0);
         let parts = (replica.shape.record_bytes as usize).div_ceil(part_bytes);
         Self {
             place,
-            describe_every_ns: DESCRIBE_EVERY_NS,
-            destinations: peers.map(|peer| Destination::new(place, peer, parts)).collect(),
+            describe_every_ns: if by_line { LINE_DESCRIBE_EVERY_NS } else { DESCRIBE_EVERY_NS },
+            destinations: peers.map(|peer| Destination::new(place, peer, parts, by_line)).collect(),
             fingerprints: replica.changed.then(Fingerprints::default),
             settings: replica.clone(),
             description: OwnDescription::default(),
@@ -58,13 +58,6 @@ impl OutgoingReplica {
             turn: 0,
             told: false,
         }
-    }
-
-    /// For one node, by a line on which nothing is lost: records are held there until they have left.
-    pub(super) fn by_line(place: u16, replica: &ReplicaSettings, peer: NodeIndex) -> Self {
-        let made = Self::new(place, replica, std::iter::once(peer), LINE_PART_BYTES);
-        let destinations = made.destinations.into_iter().map(Destination::by_line).collect();
-        Self { describe_every_ns: LINE_DESCRIBE_EVERY_NS, destinations, ..made }
     }
 
     pub(super) fn look(&mut self, participant: &Arc<Participant>, describe: &dyn Describe) {
@@ -133,11 +126,12 @@ impl OutgoingReplica {
         self.newest = Some(newest);
     }
 
-    /// Takes notice of nodes that have come, were restarted, or are gone.
-    pub(super) fn meet(&mut self, now_ns: u64, peers: &impl Peers) {
+    /// Takes notice of nodes that have come, were restarted, or are gone. `peers` says in which incarnation a node's
+    /// router is (0: none is known), which may have had other records in an earlier one; and whether it is there.
+    pub(super) fn meet(&mut self, now_ns: u64, peers: &impl Fn(NodeIndex) -> (u64, bool)) {
         let Self { reader, newest, destinations, .. } = self;
         for destination in destinations {
-            let incarnation = peers.incarnation_of(destination.peer);
+            let (incarnation, is_there) = peers(destination.peer);
             if std::mem::replace(&mut destination.incarnation, incarnation) != incarnation {
                 // It may have nothing: the description and the newest record go to it at once.
                 (destination.describe_ns, destination.describing) = (0, None);
@@ -147,7 +141,7 @@ impl OutgoingReplica {
                 destination.next = destination.next.zip(again).map(|(next, again)| next.min(again));
                 destination.has_none = true;
             }
-            if !peers.is_there(now_ns, destination.peer) {
+            if !is_there {
                 destination.pass_over(newest.as_ref());
                 continue;
             }

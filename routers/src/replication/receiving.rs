@@ -9,7 +9,7 @@ use super::gathering::Life;
 use super::incoming::{IncomingReplica, Now};
 use super::requests::{IncomingRequests, PartRequests, RequestFate};
 use super::settings::ReplicaSettings;
-use super::{Describe, LINE_PART_BYTES, part_bytes};
+use super::{Describe, part_bytes};
 use crate::frame::{DescriptionPart, FrameHead, NodeIndex, ReplicaFrame};
 use crate::settings::Settings;
 use rohrpost_mailbox::{Name, NodeError, Participant, StreamId, SystemTime};
@@ -42,30 +42,20 @@ impl ReplicaReceiver {
         participant: Arc<Participant>,
         describe: Arc<dyn Describe>,
     ) -> Self {
-        Self::of((settings.own, part_bytes(settings)), replicas, participant, describe)
+        Self::of(settings.own, (part_bytes(settings), false), replicas, participant, describe)
     }
 
-    /// The same of those that come by sessions.
-    pub(super) fn of_line(
+    /// With parts of so many bytes, by a line or not.
+    pub(super) fn of(
         own: NodeIndex,
-        replicas: &[ReplicaSettings],
-        participant: Arc<Participant>,
-        describe: Arc<dyn Describe>,
-    ) -> Self {
-        let made = Self::of((own, LINE_PART_BYTES), replicas, participant, describe);
-        let streams = made.streams.into_iter().map(|stream| stream.map(IncomingReplica::by_line)).collect();
-        Self { streams, ..made }
-    }
-
-    fn of(
-        (own, part_bytes): (NodeIndex, usize),
+        (part_bytes, by_line): (usize, bool),
         replicas: &[ReplicaSettings],
         participant: Arc<Participant>,
         describe: Arc<dyn Describe>,
     ) -> Self {
         let incoming = |(place, replica): (u16, &ReplicaSettings)| {
             let is_here = replica.to & 1 << own != 0 && replica.node != own;
-            is_here.then(|| IncomingReplica::new(place, replica, part_bytes))
+            is_here.then(|| IncomingReplica::new(place, replica, part_bytes, by_line))
         };
         let streams = (0..).zip(replicas).map(incoming).collect();
         Self { participant, describe, streams, requests: None, waits: false, look_ns: 0, rings: false }

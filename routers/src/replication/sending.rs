@@ -15,6 +15,7 @@ use crate::frame::{self, NodeIndex, RECORD_PART_HEAD_BYTES};
 use crate::outbound::Outbound;
 use crate::settings::Settings;
 use rohrpost_mailbox::{Participant, StreamReader, SystemTime};
+use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 /// Next step for the code around the core.
@@ -56,7 +57,7 @@ impl ReplicaSender {
     pub fn new(settings: &Settings, replicas: &[ReplicaSettings]) -> Self {
         let own = (0..).zip(replicas).filter(|(_, replica)| replica.node == settings.own);
         let part_bytes = part_bytes(settings);
-        let streams = own.map(|(place, replica)| OutgoingReplica::new(place, replica, settings.peers(), part_bytes));
+        let streams = own.map(|of| OutgoingReplica::new(of, settings.peers(), part_bytes, false));
         let by_level = StreamsByLevel::new(streams.collect());
         let here = replicas.iter().filter(|replica| replica.to & 1 << settings.own != 0);
         let origins = here.fold(0, |all, replica| all | 1 << replica.node) & !(1 << settings.own);
@@ -113,14 +114,14 @@ impl ReplicaSender {
         outbound: &mut Outbound,
         datagram: &mut [u8],
     ) -> ReplicaStep {
-        self.by_level.refresh(now_ns, outbound);
+        self.by_level.refresh(now_ns, |peer| (outbound.incarnation_of(peer), outbound.is_there(now_ns, peer)));
         for (from, request) in self.requests.take_next() {
             let stream = self.by_level.streams.iter_mut().find(|stream| stream.place == request.place);
             stream.into_iter().for_each(|stream| stream.ask(from, &request, (self.incarnation, self.part_bytes)));
         }
         loop {
             let ready = outbound.ready_peers();
-            let chosen = self.by_level.choose(now_ns, ready);
+            let chosen = self.by_level.choose(now_ns, ready, LEVELS as u8);
             let level = chosen.map(|(at, _)| self.by_level.streams[at].settings.level);
             match self.requests.next(now_ns, level, outbound, datagram) {
                 Some(Ok((to, bytes))) => return ReplicaStep::Send { to, bytes },

@@ -254,6 +254,11 @@ fn read(reader: &mut StreamReader) -> (Vec<(u64, usize)>, u64) {
     }
 }
 
+/// Sequences of what a reader has.
+fn sequences(reader: &mut StreamReader) -> Vec<u64> {
+    read(reader).0.into_iter().map(|(sequence, _)| sequence).collect()
+}
+
 /// System time of both nodes: that of the tests.
 fn time(ns: u64) -> SystemTime {
     SystemTime { ns, epoch: 1, error: Duration::from_micros(10), age: Duration::ZERO }

@@ -12,16 +12,10 @@ pub const HELLO_SLOT_BYTES: usize = HELLO_DATAGRAM_BYTES - TAG_BYTES;
 /// Used by the sending thread of a node in time slots.
 pub struct HelloQueue {
     all: Arc<PeerSessions>,
-    peers: Box<[PeerHellos]>,
+    /// By peer: its challenge and its reply.
+    peers: Box<[[Option<Word>; 2]]>,
     /// The peer with the next turn.
     next: usize,
-}
-
-/// Hellos to one peer that wait.
-#[derive(Clone, Default)]
-struct PeerHellos {
-    reply: Option<Word>,
-    challenge: Option<Word>,
 }
 
 #[derive(Clone, Copy)]
@@ -36,7 +30,7 @@ struct Word {
 impl HelloQueue {
     /// Nothing waits.
     pub fn new(all: &Arc<PeerSessions>) -> Self {
-        Self { peers: vec![PeerHellos::default(); all.router.nodes.into()].into(), all: all.clone(), next: 0 }
+        Self { peers: vec![[None; 2]; all.router.nodes.into()].into(), all: all.clone(), next: 0 }
     }
 
     /// A hello that is to leave. It replaces the waiting hello. A reply that starts a session is replaced only by
@@ -48,7 +42,7 @@ impl HelloQueue {
         let mut word = Word { at_ns: now_ns, begins: said.begins, datagram: [0; HELLO_DATAGRAM_BYTES] };
         word.datagram.copy_from_slice(&datagram[..HELLO_DATAGRAM_BYTES]);
         let Some(peer) = self.peers.get_mut(usize::from(said.to)) else { return };
-        let place = if said.is_reply { &mut peer.reply } else { &mut peer.challenge };
+        let place = &mut peer[usize::from(said.is_reply)];
         let stays = place.is_some_and(|before| before.begins && !word.begins && !before.is_old(now_ns));
         if !stays {
             *place = Some(word);
@@ -67,21 +61,15 @@ impl HelloQueue {
         for is_reply in [true, false] {
             let turns = (0..peers).map(|turn| (next + turn) % peers);
             for to in first.into_iter().chain(turns) {
-                let peer = &mut self.peers[to];
-                let place = if is_reply { &mut peer.reply } else { &mut peer.challenge };
-                let Some(word) = place.take() else { continue };
+                let Some(word) = self.peers[to][usize::from(is_reply)].take() else { continue };
                 if word.is_old(now_ns) {
                     if word.begins {
                         self.all.reply_left(to as NodeIndex);
                     }
                 } else {
                     self.next = (to + 1) % peers;
-                    let said = OutgoingHello {
-                        to: to as NodeIndex,
-                        bytes: HELLO_DATAGRAM_BYTES,
-                        is_reply,
-                        begins: word.begins,
-                    };
+                    let (bytes, begins) = (HELLO_DATAGRAM_BYTES, word.begins);
+                    let said = OutgoingHello { to: to as NodeIndex, bytes, is_reply, begins };
                     return Some((said, word.datagram));
                 }
             }

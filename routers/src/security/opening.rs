@@ -90,18 +90,8 @@ impl Opening {
         datagram: &'a mut [u8],
         is_there: impl Fn(NodeIndex) -> bool,
     ) -> Result<Opened<'a>, NotOpened> {
-        let (head, key_id) = FrameHead::read(datagram)?;
+        let (head, key) = self.head(datagram, is_there)?;
         let all = &self.all;
-        if key_id == 0 {
-            return Err(Rejection::Unsealed.into());
-        }
-        let key = all.keys.place(key_id).ok_or(Rejection::OtherKey)?;
-        if !self.is_ours(&head) {
-            return Err(Rejection::NotOurs.into());
-        }
-        if !is_there(head.from) {
-            return Err(Rejection::Address.into());
-        }
         if head.kind == FrameKind::Hello {
             return Ok(Opened::Hello(head, self.hello(&head, key, datagram)?));
         }
@@ -139,23 +129,28 @@ impl Opening {
     }
 
     /// Opens a datagram that [`Self::is_strange`]: some incarnation of its node has said it to this node at some time.
-    /// For each incarnation that is named a key is derived, which costs about as much as to open a datagram.
+    /// For each incarnation that is named a key is derived, which costs about as much as to open a datagram. `is_there`:
+    /// see [`Self::open_from`].
     ///
     /// # Errors
     /// [`NotOpened`]
-    pub fn overhear<'a>(&mut self, datagram: &'a mut [u8]) -> Result<(FrameHead, &'a [u8]), NotOpened> {
-        self.overhear_from(datagram, |_| true)
-    }
-
-    /// The same, if it comes from where the node is that it says it is from.
-    ///
-    /// # Errors
-    /// [`NotOpened`]
-    pub fn overhear_from<'a>(
+    pub fn overhear<'a>(
         &mut self,
         datagram: &'a mut [u8],
         is_there: impl Fn(NodeIndex) -> bool,
     ) -> Result<(FrameHead, &'a [u8]), NotOpened> {
+        let (head, key) = self.head(datagram, is_there)?;
+        self.all.doubt(head.from);
+        let all = &self.all;
+        let text = self.overheard[usize::from(head.from)].open((&head, key), datagram, || {
+            let peer = Endpoint { node: head.from, incarnation: head.incarnation };
+            all.keys.derive(key, &all.binding(Port::Time, peer, all.own()))
+        });
+        Ok((head, text.ok_or(Rejection::Forged)?))
+    }
+
+    /// The head of what says that it is for this node, and comes from where its sender is; and the place of its key.
+    fn head(&self, datagram: &[u8], is_there: impl Fn(NodeIndex) -> bool) -> Result<(FrameHead, usize), NotOpened> {
         let (head, key_id) = FrameHead::read(datagram)?;
         if key_id == 0 {
             return Err(Rejection::Unsealed.into());
@@ -167,13 +162,7 @@ impl Opening {
         if !is_there(head.from) {
             return Err(Rejection::Address.into());
         }
-        self.all.doubt(head.from);
-        let all = &self.all;
-        let text = self.overheard[usize::from(head.from)].open((&head, key), datagram, || {
-            let peer = Endpoint { node: head.from, incarnation: head.incarnation };
-            all.keys.derive(key, &all.binding(Port::Time, peer, all.own()))
-        });
-        Ok((head, text.ok_or(Rejection::Forged)?))
+        Ok((head, key))
     }
 
     /// Whether it says that it comes from another node of ours, to this one.

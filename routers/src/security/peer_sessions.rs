@@ -86,6 +86,7 @@ impl fmt::Debug for PeerSessions {
 }
 
 /// Keys, challenge and counters of one peer.
+#[derive(Default)]
 struct PeerSession {
     /// By the place of the key.
     hello_to: Vec<Seal>,
@@ -115,16 +116,12 @@ impl PeerSessions {
         let peer = |node| PeerSession {
             hello_to: seals(router.own, node),
             hello_from: seals(node, router.own),
-            session: Published::default(),
-            challenge: AtomicU64::new(0),
-            asked: AtomicU32::new(0),
-            hellos: AtomicU64::new(0),
-            sealed: Default::default(),
+            ..PeerSession::default()
         };
         let peers = (0..router.nodes).map(peer).collect();
         let rejections = Port::ALL.map(|_| Arc::new(Rejections::new(router.nodes)));
-        let none = || AtomicU64::new(0);
-        Arc::new(Self { peers, router, keys, known: none(), doubts: none(), unsaid: none(), rejections })
+        let (known, doubts, unsaid) = Default::default();
+        Arc::new(Self { peers, router, keys, known, doubts, unsaid, rejections })
     }
 
     /// What was not taken at a port.
@@ -234,9 +231,9 @@ impl PeerSessions {
         &self.peer(peer).hello_from[key]
     }
 
-    /// A challenge to a peer, with one of its keys after the other: which of them the peer has is not known. None
-    /// as long as no incarnation of it could take an answer.
-    pub(super) fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
+    /// Asks a peer whether it lives, in the first bytes of a datagram; how many. With one of the keys after the other:
+    /// which of them the peer has is not known. None as long as no incarnation of it could take an answer.
+    pub fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
         let hello = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
         if hello.challenge == 0 {
             return None;

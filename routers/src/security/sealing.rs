@@ -119,9 +119,4 @@ impl Sealing {
             PeerSeal { key: session.key, seal }
         })
     }
-
-    /// Asks a peer whether it lives, in the first bytes of a datagram; how many. It is to be asked until it is heard.
-    pub fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
-        self.all.ask(peer, datagram)
-    }
 }

@@ -3,7 +3,7 @@
 use super::counts::{Cause, SessionCounts};
 use super::outgoing::Fates;
 use super::server::Principals;
-use super::{ErrorReplies, answer_to};
+use super::{EndHost, answer_to};
 use rohrpost_mailbox::Head;
 
 /// Accounts for what leaves by one connection.
@@ -33,7 +33,7 @@ impl<'a, H> Ledger<'a, H> {
     }
 }
 
-impl<H: ErrorReplies> Fates for Ledger<'_, H> {
+impl<H: EndHost> Fates for Ledger<'_, H> {
     fn passed(&mut self, head: &Head) {
         self.counts.passed(head.priority);
     }

@@ -63,19 +63,16 @@ pub const FRAME_MAX_NS: u64 = 30_000_000_000;
 /// Interval between two looks for what only the passing of time changes.
 pub const LOOK_EVERY_NS: u64 = 100_000_000;
 
-/// The replicas of an end of sessions.
-pub trait ReplicaEnd {
-    /// They; none: it has none, and what comes of such is not counted.
+/// What both ends of sessions need from the code that runs them.
+pub trait EndHost {
+    /// Appends the answer to a command that goes no further, with a body that begins with these bytes. The routers do
+    /// not know how an error is encoded. `holder`: the client that it was for. False: it gets none.
+    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool;
+
+    /// Its replicas; none: it has none, and what comes of such is not counted.
     fn replicas(&mut self) -> Option<&mut LineReplicas> {
         None
     }
-}
-
-/// Writes the error replies to commands that go no further. The routers do not know how an error is encoded.
-pub trait ErrorReplies {
-    /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for.
-    /// False: it gets none.
-    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool;
 }
 
 /// The answer to a command that goes no further, in the name of the module that it was for. None for what nobody waits
@@ -85,7 +82,7 @@ fn answer_to(
     call: &[u8],
     why: Cause,
     holder: Option<&str>,
-    answers: &mut impl ErrorReplies,
+    answers: &mut impl EndHost,
 ) -> Option<(Head, Vec<u8>)> {
     let Kind::Command(number) = head.kind.kind() else { return None };
     let is_answered = head.from.is_mailbox() && head.to.is_mailbox() && why.told().is_some();

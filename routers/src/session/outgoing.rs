@@ -136,8 +136,7 @@ impl Outgoing {
     /// The same, before all packages that have not begun to leave. What has left when [`sent`](Self::sent) has come so
     /// far.
     pub(super) fn hurry(&mut self, message: &SessionMessage<'_>) -> u64 {
-        let mut frame = Vec::new();
-        message.write(&mut frame);
+        let frame = message.to_bytes();
         let at = self.next_frame().max(self.hurried);
         self.hurried = at + frame.len();
         self.ready.splice(at..at, frame);

@@ -1,6 +1,6 @@
 //! Parts of replicas, as an end of a session sends them.
 
-use super::ReplicaEnd;
+use super::EndHost;
 use super::frame::{HEAD_BYTES, SessionFrameKind};
 use super::outgoing::Outgoing;
 use crate::frame::{FrameKind, NodeIndex, RECORD_PART_HEAD_BYTES};
@@ -16,7 +16,7 @@ pub(super) fn add_part(
     outgoing: &mut Outgoing,
     now_ns: u64,
     (node, party): (NodeIndex, u32),
-    end: &mut impl ReplicaEnd,
+    end: &mut impl EndHost,
 ) -> (bool, bool) {
     let Some(replicas) = end.replicas() else { return (false, false) };
     let is_made = outgoing.add_part((LINE_PART_ROOM, party), |level, content| {

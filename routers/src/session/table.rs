@@ -114,9 +114,14 @@ impl RoutingTable {
         (hosted.last >= name).then_some(hosted.client)
     }
 
-    /// Ranges of a client.
+    /// Ranges of a client, in the order of their names.
+    pub fn ranges_of(&self, client: ClientIndex) -> &[Range] {
+        self.of_client.get(&client).map_or(&[], |ranges| ranges)
+    }
+
+    /// How many ranges a client has.
     pub fn count_of(&self, client: ClientIndex) -> usize {
-        self.of_client.get(&client).map_or(0, |ranges| ranges.len())
+        self.ranges_of(client).len()
     }
 
     /// Ranges of all clients.
@@ -132,11 +137,6 @@ impl RoutingTable {
     /// Systems of which some names are hosted.
     pub fn systems(&self) -> &[u8] {
         &self.systems
-    }
-
-    /// All ranges, each with its host.
-    pub fn hosted(&self) -> impl Iterator<Item = (ClientIndex, Range)> {
-        self.ranges.iter().map(|(first, hosted)| (hosted.client, Range { first: *first, last: hosted.last }))
     }
 
     /// A range of another client that has names in common with this one.

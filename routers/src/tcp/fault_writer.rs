@@ -1,6 +1,6 @@
 //! Answers in the name of modules that are not reached, as the routers of the LAN write them.
 
-use crate::session::{Cause, ErrorReplies};
+use crate::session::Cause;
 use crate::shell::{Faults, Undelivered};
 use std::sync::Arc;
 
@@ -19,10 +19,9 @@ impl FaultWriter {
     pub(super) fn new(faults: Arc<dyn Faults>, beyond: String) -> Self {
         Self { faults, beyond, takes_bytes: None, rule: None }
     }
-}
 
-impl ErrorReplies for FaultWriter {
-    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
+    /// See [`EndHost::answer`](crate::session::EndHost::answer).
+    pub(super) fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
         let Some(cause) = why.told() else { return false };
         let node = Some(holder.unwrap_or(&self.beyond));
         self.faults.write(

@@ -25,6 +25,6 @@ pub use client::{ClientError, ClientParts, ClientShell};
 pub use replicas::{LineCounts, LineParts};
 pub use seal::{AUTHORITY, Authority, ClientSeal, Holder, PREFIX, SealError, Sealed, ServerSeal, is_about};
 pub use server::{ServerError, ServerParts, ServerShell};
-pub use snapshots::{Class, ClientLink, LinkState, MEMBERS_MAX, MemberSnapshot, Members, Outage};
+pub use snapshots::{Class, ClientLink, LinkState, MEMBERS_MAX, Members, Outage};
 pub use stream::{Moved, Stream};
 pub use validity::holds_until_s;

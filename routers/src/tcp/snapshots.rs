@@ -1,8 +1,8 @@
 //! State of a client and the server, as their threads last stored it, for the thread that publishes it.
 
-use crate::session::server::Crowded;
+use crate::session::server::{Crowded, MemberSnapshot};
 use crate::session::{Cause, SessionCounts};
-use rohrpost_mailbox::{Name, Priority, TimeRecord};
+use rohrpost_mailbox::{Priority, TimeRecord};
 use std::sync::{Mutex, PoisonError};
 
 /// Interval between two snapshots.
@@ -10,8 +10,6 @@ pub(super) const SAY_EVERY_NS: u64 = 200_000_000;
 
 /// Members that are said one by one: with what else is said they must fit into a package.
 pub const MEMBERS_MAX: usize = 300;
-/// Ranges of a client that are told by name.
-pub(super) const HOSTS_MAX: usize = 64;
 
 /// Counts of one class at one end.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -105,31 +103,6 @@ pub struct ClientLink {
     pub out: Vec<Class>,
     /// What came from it.
     pub inn: Vec<Class>,
-}
-
-/// A client, as the server sees it.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct MemberSnapshot {
-    /// Its name; before its hello, where it comes from.
-    pub name: String,
-    /// Where it comes from.
-    pub peer: String,
-    /// First byte of the names that it hosts; 0 before its hello.
-    pub system: u8,
-    /// Whether it takes part.
-    pub is_member: bool,
-    /// Ranges of names that it hosts.
-    pub ranges: u64,
-    /// The first of them, each from the first to the last name in it.
-    pub hosts: Vec<(Name, Name)>,
-    /// Time since its connection was made, ns.
-    pub age_ns: u64,
-    /// Time since something came from it, ns.
-    pub heard_ns: u64,
-    /// Packages lost in queues since it, or another connection of its principal, sent more than its share.
-    pub lost: u64,
-    /// Bytes of memory that it takes up, with what waits for it.
-    pub bytes: u64,
 }
 
 /// All that the server has to say.

@@ -68,13 +68,11 @@ fn packages_on_the_lan_come_beside_a_flood_of_a_tcp_router() {
         });
         let mut heard = pair.sides[1].receiver(module(1), Shape { slots: 64, ..Shape::default() });
         let mut sender = pair.sides[0].sender(module(1));
-        let mut flood = Vec::new();
         let (to_name, from_name) = (crate::ground::module(3), crate::ground::module(4));
         let (kind, priority) = (Type::data(1), Priority(90));
         let head = Head { to: to_name, from: from_name, len: 1000, kind, priority, ..Head::default() };
-        for _ in 0..32 {
-            SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] }).write(&mut flood);
-        }
+        let one = SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] });
+        let flood = one.to_bytes().repeat(32);
         let (ends, carried) = (AtomicBool::new(false), AtomicU64::new(0));
         std::thread::scope(|scope| {
             scope.spawn(|| {

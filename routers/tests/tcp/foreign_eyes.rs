@@ -1,27 +1,21 @@
 //! What crosses a network, as Wireshark reads it: without security all of it, with security the heads of datagrams and
 //! TLS, and nothing else.
 
-use crate::ground::{System, node, start_sealed, wait};
+use crate::ground::wait;
 use crate::lan::Side;
-use crate::sealed::{Authority, Holds};
+use crate::network::{ADDRESSES, CLIENTS, Joined, PORT, lab};
+use crate::sealed::Authority;
 use rohrpost_mailbox::{Label, Name, Node, Priority, Shape, Type};
-use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
-use rohrpost_routers::tcp::ServerSeal;
+use rohrpost_routers::lab::{Capture, Lab};
 use rohrpost_testbed::report::skipped;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::net::{IpAddr, SocketAddr};
 use std::path::Path;
 use std::process::Command;
 
-const TCP_PORT: u16 = 21_443;
 const UDP_PORT: u16 = 21_117;
-const ADDRESSES: [IpAddr; 2] =
-    [IpAddr::V4(std::net::Ipv4Addr::new(10, 77, 0, 1)), IpAddr::V4(std::net::Ipv4Addr::new(10, 77, 0, 2))];
 /// So many packages cross in each way.
 const PACKAGES: usize = 100;
-/// Identities that clients send.
-const CLIENTS: [&str; 2] = ["the client of the arm", "the client of the tower"];
 /// In each body, by datagrams and by TCP, between bytes that recur.
 const WORDS: [&str; 2] = ["the safe is behind the picture", "its combination is 4711"];
 const RECURRING: [u8; 24] = [0xd7; 24];
@@ -74,7 +68,7 @@ impl Read {
 
     /// A field of each frame that a filter finds.
     fn fields(&self, filter: &str, field: &str) -> Vec<String> {
-        let tls = format!("tcp.port=={TCP_PORT},tls");
+        let tls = format!("tcp.port=={PORT},tls");
         let said = Command::new("tshark")
             .env("HOME", self.folder.path())
             .env("XDG_CONFIG_HOME", self.folder.path())
@@ -95,15 +89,7 @@ fn body() -> Vec<u8> {
 /// Two nodes with routers that exchange datagrams, and the TCP router on one of them with a client on each. None where
 /// namespaces cannot be made.
 fn recorded(authority: Option<&Authority>) -> Option<Read> {
-    let spec = |name: &str, address| NodeSpec { name: name.into(), address };
-    let lab = match Lab::new(&[spec("base", ADDRESSES[0]), spec("far", ADDRESSES[1])], 1500) {
-        Ok(lab) => lab,
-        Err(LabError::NotAllowed(error)) => {
-            skipped(&format!("network namespaces ({error})"));
-            return None;
-        }
-        Err(error) => panic!("{error}"),
-    };
+    let lab = lab()?;
     let read = Read { folder: tempfile::tempdir().unwrap() };
     let mut recorded = Recorded::new(&lab, &read.folder.path().join("wire.pcap"));
     cross_lan(&lab, authority.is_some(), &mut recorded);
@@ -143,20 +129,8 @@ fn cross_lan(lab: &Lab, sealed: bool, recorded: &mut Recorded) {
 }
 
 fn cross_tcp(lab: &Lab, authority: Option<&Authority>, recorded: &mut Recorded) {
-    let server = SocketAddr::from((ADDRESSES[0], TCP_PORT));
-    let seal = |system| authority.map(|authority| authority.seal(system, Holds::Now));
-    let (_folder, own) = node();
-    let (_router, mut near) = {
-        let _inside = lab.enter("base").unwrap();
-        let seals = authority.map(|all| ServerSeal::load(all.path()).unwrap());
-        (start_sealed(server, &own, 1, seals).unwrap(), System::sealed(2, CLIENTS[0], server, seal(2)))
-    };
-    let far = {
-        let _inside = lab.enter("far").unwrap();
-        System::sealed(1, CLIENTS[1], server, seal(1))
-    };
-    near.wait_up();
-    far.wait_up();
+    let mut joined = Joined::new(lab, authority);
+    let (near, far) = (&mut joined.near, &joined.far);
     let (mut sender, mut came) = (far.sender(2), 0);
     wait("packages cross by TCP", || {
         let _ = sender.send(&label(crate::ground::module(1)), &[&body()]);
@@ -214,6 +188,6 @@ fn wireshark_reads_all_without_security_and_of_what_is_sealed_nothing() {
     assert_eq!(sealed.frames("tls.handshake.certificate"), 0);
     // What the kernel has sent again Wireshark does not look into; the words were looked for there as well.
     let again = "tcp.analysis.retransmission || tcp.analysis.spurious_retransmission || tcp.analysis.out_of_order";
-    let bare = format!("tcp.port == {TCP_PORT} && tcp.len > 0 && !tls && !({again})");
+    let bare = format!("tcp.port == {PORT} && tcp.len > 0 && !tls && !({again})");
     assert_eq!(sealed.fields(&bare, "tcp.payload"), [""; 0], "all that a session sends is TLS");
 }

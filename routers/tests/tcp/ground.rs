@@ -1,12 +1,13 @@
 //! A TCP router and systems of one node each, in this process.
 
+use crate::sealed::{Authority, seal};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type, local, monotonic_ns};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::session::client::ClientSettings;
 use rohrpost_routers::session::server::{Names, OwnNodes, ServerSettings};
 use rohrpost_routers::shell::{Faults, Undelivered};
 use rohrpost_routers::tcp::{
-    ClientParts, ClientSeal, ClientShell, LinkState, ServerError, ServerParts, ServerSeal, ServerShell,
+    ClientParts, ClientSeal, ClientShell, LinkState, Members, ServerError, ServerParts, ServerSeal, ServerShell,
 };
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -56,47 +57,78 @@ pub(crate) fn node() -> (tempfile::TempDir, Arc<Node>) {
     (folder, node)
 }
 
-pub(crate) fn start(address: SocketAddr, node: &Arc<Node>, incarnation: u64) -> Result<ServerShell, ServerError> {
-    start_sealed(address, node, incarnation, None)
-}
-
-pub(crate) fn start_sealed(
-    address: SocketAddr,
-    node: &Arc<Node>,
+/// A TCP router, and the node that it runs on.
+pub(crate) struct Router {
+    pub(crate) address: SocketAddr,
+    shell: Option<ServerShell>,
     incarnation: u64,
     seal: Option<ServerSeal>,
-) -> Result<ServerShell, ServerError> {
-    start_for(address, node, incarnation, seal, None)
+    node: Arc<Node>,
+    _folder: tempfile::TempDir,
 }
 
-/// Starts one for system 1, if the names that its nodes host are given.
-pub(crate) fn start_for(
-    address: SocketAddr,
-    node: &Arc<Node>,
-    incarnation: u64,
-    seal: Option<ServerSeal>,
-    names: Option<BTreeMap<String, Names>>,
-) -> Result<ServerShell, ServerError> {
-    let settings = ServerSettings {
-        name: "the TCP router".into(),
-        common: COMMON,
-        system: names.is_some().then_some((1, 1)),
-        own_nodes: OwnNodes::default(),
-        incarnation,
-        clients_max: 16,
-        handshakes_max: 16,
-        quota_bytes: 256 << 10,
-        levels: [0; 256],
-    };
-    ServerShell::start(ServerParts {
-        address,
-        settings,
-        faults: Arc::new(Words),
-        seal,
-        names: names.unwrap_or_default(),
-        node,
-        replicas: None,
-    })
+impl Router {
+    /// At an address of its own, without security.
+    pub(crate) fn start() -> Self {
+        Self::at(address(), None)
+    }
+
+    pub(crate) fn at(address: SocketAddr, seal: Option<ServerSeal>) -> Self {
+        Self::of(address, seal, None)
+    }
+
+    /// For system 1, if the names that its nodes host are given.
+    pub(crate) fn of(address: SocketAddr, seal: Option<ServerSeal>, names: Option<BTreeMap<String, Names>>) -> Self {
+        let (folder, node) = node();
+        let mut router = Self { address, shell: None, incarnation: 1, seal, node, _folder: folder };
+        router.shell = Some(router.shell_for(names).unwrap());
+        router
+    }
+
+    pub(crate) fn end(&mut self) {
+        self.shell = None;
+    }
+
+    /// The next incarnation of it.
+    pub(crate) fn begin_again(&mut self, names: Option<BTreeMap<String, Names>>) {
+        self.incarnation += 1;
+        self.shell = Some(wait("its port is free", || self.shell_for(names.clone()).ok()));
+    }
+
+    pub(crate) fn members(&self) -> Members {
+        self.shell.as_ref().unwrap().members()
+    }
+
+    fn shell_for(&self, names: Option<BTreeMap<String, Names>>) -> Result<ServerShell, ServerError> {
+        let settings = ServerSettings {
+            name: "the TCP router".into(),
+            common: COMMON,
+            system: names.is_some().then_some((1, 1)),
+            own_nodes: OwnNodes::default(),
+            incarnation: self.incarnation,
+            clients_max: 16,
+            handshakes_max: 16,
+            quota_bytes: 256 << 10,
+            levels: [0; 256],
+        };
+        ServerShell::start(ServerParts {
+            address: self.address,
+            settings,
+            faults: Arc::new(Words),
+            seal: self.seal.clone(),
+            names: names.unwrap_or_default(),
+            node: &self.node,
+            replicas: None,
+        })
+    }
+}
+
+/// The systems 1 and 2, which take part.
+pub(crate) fn two(server: SocketAddr, authority: Option<&Authority>) -> (System, System) {
+    let [one, two] = [(1, "one"), (2, "two")].map(|(id, name)| System::sealed(id, name, server, seal(authority, id)));
+    one.wait_up();
+    two.wait_up();
+    (one, two)
 }
 
 /// A system of one node, with a module that hears and speaks.
@@ -105,7 +137,7 @@ pub(crate) struct System {
     pub(crate) client: ClientShell,
     pub(crate) participant: Arc<Participant>,
     heard: Receiver,
-    pub(crate) replies: Receiver,
+    replies: Receiver,
     _folder: tempfile::TempDir,
 }
 
@@ -180,6 +212,11 @@ impl System {
         let label = Label { from, kind: Type::command(16), priority: Priority(100), ..Label::default() };
         // A mailbox that is full for a moment is no matter here.
         let _ = sender.send(&label, &[&number.to_le_bytes()]);
+    }
+
+    /// The body of the next answer.
+    pub(crate) fn answer(&mut self) -> String {
+        wait("an answer", || self.replies.try_receive().map(|package| String::from_utf8_lossy(package.body()).into()))
     }
 
     /// The next number that came.

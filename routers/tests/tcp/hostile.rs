@@ -1,8 +1,8 @@
 //! A TCP router in a process of its own, and attackers: others are served all the while, and its memory stays what it
 //! was.
 
-use crate::ground::{COMMON, System, address, node, start_sealed, wait};
-use crate::sealed::{Authority, Holds};
+use crate::ground::{COMMON, Router, System, address, two, wait};
+use crate::sealed::{Authority, seal};
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use rohrpost_mailbox::{Head, Priority, Type};
@@ -36,8 +36,7 @@ fn in_a_process_of_its_own() {
     let Ok(order) = std::env::var(SERVER) else { return };
     let (address, folder) = order.split_once(' ').unwrap();
     let seal = (!folder.is_empty()).then(|| ServerSeal::load(Path::new(folder)).unwrap());
-    let (_folder, own) = node();
-    let server = start_sealed(address.parse().unwrap(), &own, 1, seal).unwrap();
+    let server = Router::at(address.parse().unwrap(), seal);
     // Until the test that has the other end of this pipe ends.
     loop {
         let members = server.members();
@@ -123,9 +122,7 @@ fn hello(incarnation: u64) -> Vec<u8> {
     let (reaches_own, attempt, asked_ns, name) = (false, 1, 0, "hostile");
     let hello =
         SessionHello { system, reaches_own, common: COMMON, system_digest, incarnation, attempt, asked_ns, name };
-    let mut bytes = Vec::new();
-    SessionMessage::Hello(hello).write(&mut bytes);
-    bytes
+    SessionMessage::Hello(hello).to_bytes()
 }
 
 /// What a client may say, or nearly.
@@ -234,11 +231,7 @@ fn slow(target: &Target, ends: &AtomicBool) {
 
 fn others_are_served(authority: Option<&Authority>) {
     let target = Target::start(authority);
-    let seal = |system| authority.map(|authority| authority.seal(system, Holds::Now));
-    let (one, mut two) =
-        (System::sealed(1, "one", target.address, seal(1)), System::sealed(2, "two", target.address, seal(2)));
-    one.wait_up();
-    two.wait_up();
+    let (one, mut two) = two(target.address, authority);
     let mut sender = one.sender(2);
     let mut number = 0;
     let mut known = 2;
@@ -287,7 +280,7 @@ fn others_are_served(authority: Option<&Authority>) {
             most = most.max(target.resident_bytes());
         }
         // A new client is let in, too.
-        let three = System::sealed(3, "three", target.address, seal(3));
+        let three = System::sealed(3, "three", target.address, seal(authority, 3));
         three.wait_up();
         ends.store(true, Ordering::Relaxed);
     });

@@ -1,63 +1,61 @@
 //! Sessions over a network of their own: a line with a low rate, and what an eavesdropper sees.
 
-use crate::ground::{System, module, node, start_sealed, wait};
-use crate::sealed::{Authority, Holds};
+use crate::ground::{Router, System, module, wait};
+use crate::sealed::{Authority, seal};
 use rohrpost_mailbox::{Label, Priority, Type};
 use rohrpost_routers::lab::{DEVICE, Lab, LabError, NodeSpec};
-use rohrpost_routers::tcp::{LinkState, ServerSeal, ServerShell};
+use rohrpost_routers::tcp::LinkState;
 use rohrpost_testbed::report::skipped;
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-const PORT: u16 = 21_443;
+pub(crate) const PORT: u16 = 21_443;
 /// The largest package.
 const LARGE_BYTES: usize = 65_000;
 const LARGE: Priority = Priority(50);
-/// The client of node `far`.
-const FAR: &str = "the client of system 1";
+/// Identities that clients send: beside the TCP router, and on node `far`.
+pub(crate) const CLIENTS: [&str; 2] = ["the client of the arm", "the client of the tower"];
+pub(crate) const ADDRESSES: [IpAddr; 2] =
+    [IpAddr::V4(Ipv4Addr::new(10, 77, 0, 1)), IpAddr::V4(Ipv4Addr::new(10, 77, 0, 2))];
 /// What nobody may read.
 const SECRET: &[u8] = b"nobody may read this";
 
-/// The TCP router on `base`, system 2 beside it, and system 1 on `far`.
-struct Network {
-    lab: Lab,
-    near: System,
-    far: System,
-    _server: ServerShell,
-    _folder: tempfile::TempDir,
+/// Two nodes, `base` and `far`; none where namespaces cannot be made.
+pub(crate) fn lab() -> Option<Lab> {
+    let spec = |name: &str, address| NodeSpec { name: name.into(), address };
+    match Lab::new(&[spec("base", ADDRESSES[0]), spec("far", ADDRESSES[1])], 1500) {
+        Ok(lab) => Some(lab),
+        Err(LabError::NotAllowed(error)) => {
+            skipped(&format!("network namespaces ({error})"));
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
 }
 
-impl Network {
-    /// `line`: what `tc` makes of the line of `far`. None where namespaces cannot be made, or it does not know that.
-    fn new(authority: Option<&Authority>, line: Option<&str>) -> Option<Self> {
-        let spec = |name: &str, last| NodeSpec { name: name.into(), address: [10, 77, 0, last].into() };
-        let lab = match Lab::new(&[spec("base", 1), spec("far", 2)], 1500) {
-            Ok(lab) => lab,
-            Err(LabError::NotAllowed(error)) => {
-                skipped(&format!("network namespaces ({error})"));
-                return None;
-            }
-            Err(error) => panic!("{error}"),
-        };
-        if !line.is_none_or(|line| is_shaped(&lab, "far", line)) {
-            skipped("a line that takes little (`tc` with tbf)");
-            return None;
-        }
-        let server = SocketAddr::from(([10, 77, 0, 1], PORT));
-        let seal = |system| authority.map(|authority| authority.seal(system, Holds::Now));
-        let ((folder, own), sealed) = (node(), authority.map(|all| ServerSeal::load(all.path()).unwrap()));
-        let (router, near) = {
+/// The TCP router on `base`, system 2 beside it, and system 1 on `far`; both take part.
+pub(crate) struct Joined {
+    pub(crate) near: System,
+    pub(crate) far: System,
+    _server: Router,
+}
+
+impl Joined {
+    pub(crate) fn new(lab: &Lab, authority: Option<&Authority>) -> Self {
+        let address = SocketAddr::from((ADDRESSES[0], PORT));
+        let (server, near) = {
             let _inside = lab.enter("base").unwrap();
-            (start_sealed(server, &own, 1, sealed).unwrap(), System::sealed(2, "near", server, seal(2)))
+            let server = Router::at(address, authority.map(Authority::server));
+            (server, System::sealed(2, CLIENTS[0], address, seal(authority, 2)))
         };
         let far = {
             let _inside = lab.enter("far").unwrap();
-            System::sealed(1, FAR, server, seal(1))
+            System::sealed(1, CLIENTS[1], address, seal(authority, 1))
         };
         near.wait_up();
         far.wait_up();
-        Some(Self { lab, near, far, _server: router, _folder: folder })
+        Self { near, far, _server: server }
     }
 }
 
@@ -75,8 +73,12 @@ fn passed(system: &System, priority: Priority) -> u64 {
 /// 64 kbit/s: one of the largest packages takes eight seconds.
 fn a_slow_uplink_stays_up(authority: Option<&Authority>) {
     let line = "root tbf rate 64kbit burst 1600 limit 20000";
-    let Some(mut network) = Network::new(authority, Some(line)) else { return };
-    let far = &network.far;
+    let Some(lab) = lab() else { return };
+    if !is_shaped(&lab, "far", line) {
+        return skipped("a line that takes little (`tc` with tbf)");
+    }
+    let mut joined = Joined::new(&lab, authority);
+    let far = &joined.far;
     let (mut large, mut small) = (far.sender(2), far.sender(2));
     let label = Label { from: module(1), kind: Type::data(1), priority: LARGE, ..Label::default() };
     // The third leaves when the first two have: sixteen seconds of nothing else.
@@ -91,9 +93,9 @@ fn a_slow_uplink_stays_up(authority: Option<&Authority>) {
     wait("what is small crosses again", || {
         far.say(&mut small, 2);
         std::thread::sleep(Duration::from_millis(100));
-        network.near.hear().filter(|number| *number == 2)
+        joined.near.hear().filter(|number| *number == 2)
     });
-    assert_eq!(network.far.client.link().connections, 1);
+    assert_eq!(joined.far.client.link().connections, 1);
 }
 
 #[test]
@@ -108,22 +110,23 @@ fn a_sealed_line_of_64_kbit_a_second_stays_up_too() {
 
 /// What an eavesdropper reads of it: the bodies of packages, the names of clients, the words that sessions begin with.
 fn seen_on_the_wire(authority: Option<&Authority>) -> Option<[usize; 3]> {
-    let mut network = Network::new(authority, None)?;
-    let mut capture = network.lab.capture().unwrap();
+    let lab = lab()?;
+    let mut joined = Joined::new(&lab, authority);
+    let mut capture = lab.capture().unwrap();
     // It begins anew, so that the beginning of a session is seen as well.
-    network.lab.cut("far").unwrap();
-    wait("far is away", || (network.far.client.link().state == LinkState::Away).then_some(()));
-    network.lab.fix("far").unwrap();
-    network.far.wait_up();
+    lab.cut("far").unwrap();
+    wait("far is away", || (joined.far.client.link().state == LinkState::Away).then_some(()));
+    lab.fix("far").unwrap();
+    joined.far.wait_up();
     let label = Label { from: module(1), kind: Type::data(1), priority: Priority(100), ..Label::default() };
-    let mut sender = network.far.sender(2);
+    let mut sender = joined.far.sender(2);
     let (mut came, mut bytes, mut found) = (0, 0, [0; 3]);
     wait("packages cross", || {
         let _ = sender.send(&label, &[SECRET]);
-        came += usize::from(network.near.hear_bytes().is_some_and(|body| body == SECRET));
+        came += usize::from(joined.near.hear_bytes().is_some_and(|body| body == SECRET));
         capture.drain_frames(|frame| {
             bytes += frame.len();
-            for (count, words) in found.iter_mut().zip([SECRET, FAR.as_bytes(), b"RpTc"]) {
+            for (count, words) in found.iter_mut().zip([SECRET, CLIENTS[1].as_bytes(), b"RpTc"]) {
                 *count += usize::from(frame.windows(words.len()).any(|part| part == words));
             }
         });

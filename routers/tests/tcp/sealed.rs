@@ -1,6 +1,6 @@
 //! Sealed sessions: a client with the right certificate takes part, and each other end learns why it does not.
 
-use crate::ground::{System, address, module, node, start_for, start_sealed, wait};
+use crate::ground::{Router, System, address, module, two, wait};
 use rcgen::{CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, date_time_ymd};
 use rohrpost_mailbox::Name;
 use rohrpost_routers::session::frame::Range;
@@ -69,6 +69,15 @@ impl Authority {
         ClientSeal::load(self.path(), &holder).unwrap()
     }
 
+    /// What the TCP router begins its connections with.
+    pub(crate) fn server(&self) -> ServerSeal {
+        ServerSeal::load(self.path()).unwrap()
+    }
+
+    fn router(&self) -> Router {
+        Router::at(address(), Some(self.server()))
+    }
+
     /// A client that trusts this authority, with a certificate of another.
     pub(crate) fn forged(&self, system: u8) -> ClientSeal {
         let foreign = Self::new();
@@ -78,19 +87,20 @@ impl Authority {
     }
 }
 
+/// What a node of a system begins its connections with, if there is an authority.
+pub(crate) fn seal(authority: Option<&Authority>, system: u8) -> Option<ClientSeal> {
+    authority.map(|authority| authority.seal(system, Holds::Now))
+}
+
 fn holder(system: u8) -> Holder {
     Holder::Node { node: "base".into(), system }
 }
 
 #[test]
 fn a_client_with_a_certificate_takes_part_under_the_name_in_it() {
-    let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
-    let server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
-    let seal = |system| Some(authority.seal(system, Holds::Now));
-    let one = System::sealed(1, "one", address, seal(1));
-    let mut two = System::sealed(2, "two", address, seal(2));
-    one.wait_up();
-    two.wait_up();
+    let authority = Authority::new();
+    let server = authority.router();
+    let (one, mut two) = two(server.address, Some(&authority));
     let mut sender = one.sender(2);
     for number in 0..50 {
         one.say(&mut sender, number);
@@ -102,8 +112,8 @@ fn a_client_with_a_certificate_takes_part_under_the_name_in_it() {
 
 #[test]
 fn what_is_wrong_with_a_certificate_is_told_to_its_owner() {
-    let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
-    let server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
+    let authority = Authority::new();
+    let server = authority.router();
     let other_system = {
         authority.issue(&holder(7), Holds::Now);
         ClientSeal::load(authority.path(), &holder(7)).unwrap()
@@ -126,7 +136,7 @@ fn what_is_wrong_with_a_certificate_is_told_to_its_owner() {
         (Some(nobody), "does not fit: it names no node", "certificate: it names no node", "one that names no node"),
         (None, "it speaks TLS; write the same `security`", "does not speak TLS", "none, and no TLS"),
     ] {
-        let client = System::sealed(3, "three", address, seal);
+        let client = System::sealed(3, "three", server.address, seal);
         let link = wait(what, || Some(client.client.link()).filter(|link| link.why.contains(words)));
         assert_ne!(link.state, LinkState::Up, "{what}");
         wait(&format!("the server says {said}"), || server.members().refusal.contains(said).then_some(()));
@@ -136,49 +146,45 @@ fn what_is_wrong_with_a_certificate_is_told_to_its_owner() {
 
 #[test]
 fn a_client_that_seals_at_a_tcp_router_that_does_not_is_told_so_at_both_ends() {
-    let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
-    let server = start_sealed(address, &own, 1, None).unwrap();
-    let client = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
+    let server = Router::start();
+    let client = System::sealed(1, "one", server.address, seal(Some(&Authority::new()), 1));
     wait("the client says it", || client.client.link().why.contains("does not speak TLS").then_some(()));
     wait("the server says it", || server.members().refusal.contains("it speaks TLS; write the same").then_some(()));
 }
 
 #[test]
 fn a_certificate_of_the_own_system_hosts_what_its_file_gives_that_node_and_no_more() {
-    let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
-    let range = |name: Name| Range::module(name);
-    let others = [range(Name::new(1, 101, 0, 0))];
-    let with = |ranges: Vec<Range>| Some(BTreeMap::from([("base".to_owned(), ranges.into_iter().collect())]));
-    let seal = || Some(ServerSeal::load(authority.path()).unwrap());
-    let server = start_for(address, &own, 1, seal(), with(others.to_vec())).unwrap();
-    let one = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
-    let two = System::sealed(2, "two", address, Some(authority.seal(2, Holds::Now)));
+    let authority = Authority::new();
+    let others = [Range::module(Name::new(1, 101, 0, 0))];
+    let with = |ranges: &[Range]| Some(BTreeMap::from([("base".to_owned(), ranges.iter().copied().collect())]));
+    let mut server = Router::of(address(), Some(authority.server()), with(&others));
+    let [one, two] = [(1, "one"), (2, "two")]
+        .map(|(system, name)| System::sealed(system, name, server.address, seal(Some(&authority), system)));
     wait("why", || one.client.link().why.contains("or of its node").then_some(()));
     // Of another system it knows nothing.
     two.wait_up();
     assert!(one.client.link().state != LinkState::Up);
-    drop(server);
+    server.end();
     // That it went away is told, and when it is there again what it says.
     wait("away", || one.client.link().why.contains("is not reached").then_some(()));
-    let again = |incarnation, ranges: Vec<Range>| start_for(address, &own, incarnation, seal(), with(ranges)).ok();
-    let server = wait("its port is free", || again(2, others.to_vec()));
+    server.begin_again(with(&others));
     wait("why again", || one.client.link().why.contains("or of its node").then_some(()));
-    drop(server);
-    let _server = wait("its port is free", || again(3, vec![range(module(1)), others[0]]));
+    server.end();
+    server.begin_again(with(&[Range::module(module(1)), others[0]]));
     one.wait_up();
 }
 
 #[test]
 fn a_server_of_another_installation_is_not_believed() {
-    let (authority, foreign, address, (_folder, own)) = (Authority::new(), Authority::new(), address(), node());
-    let _server = start_sealed(address, &own, 1, Some(ServerSeal::load(foreign.path()).unwrap())).unwrap();
-    let client = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
+    let (authority, foreign) = (Authority::new(), Authority::new());
+    let client_of = |server: &Router| System::sealed(1, "one", server.address, seal(Some(&authority), 1));
+    let server = foreign.router();
+    let client = client_of(&server);
     wait("why", || client.client.link().why.contains("its certificate is foreign").then_some(()));
     // A node's certificate makes nobody a server.
     authority.issue_as(&Holder::Router, "base.system-1.rohrpost", Holds::Now);
-    let (address, (_folder, own)) = (self::address(), node());
-    let _server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
-    let client = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
+    let server = authority.router();
+    let client = client_of(&server);
     wait("why", || client.client.link().why.contains("not that of a TCP router").then_some(()));
 }
 

@@ -1,8 +1,8 @@
 //! What crosses, what a dead server costs, and which client holds up which.
 
-use crate::ground::{COMMON, System, address, module, node, start, wait};
+use crate::ground::{COMMON, Router, System, module, two, wait};
 use rohrpost_config as config;
-use rohrpost_mailbox::{ALL_SYSTEMS, Class, Head, Priority, Type};
+use rohrpost_mailbox::{ALL_SYSTEMS, Class, Head, Priority, Sender, Type};
 use rohrpost_routers::admission::{Access, Admission};
 use rohrpost_routers::session::frame::{Carried, Range, Ranges, SessionHello, SessionMessage};
 use rohrpost_routers::tcp::{ClientLink, LinkState};
@@ -36,15 +36,12 @@ impl Raw {
     }
 
     pub(crate) fn say(&mut self, message: &SessionMessage<'_>) {
-        let mut bytes = Vec::new();
-        message.write(&mut bytes);
-        self.0.write_all(&bytes).unwrap();
+        self.0.write_all(&message.to_bytes()).unwrap();
     }
 
     pub(crate) fn hosts(&mut self, system: u8) {
         let range = Range { first: module(system), last: module(system).with_local(255) };
-        let mut bytes = Vec::new();
-        self.say(&SessionMessage::Register(Ranges::new(1, &[range], &mut bytes)));
+        self.say(&SessionMessage::Register(Ranges::new(1, &[range], &mut Vec::new())));
     }
 
     /// Reads until the connection is closed; what came.
@@ -68,11 +65,8 @@ impl Raw {
 
 #[test]
 fn packages_cross_from_system_to_system_and_what_is_not_there_is_answered() {
-    let (address, (_folder, own)) = (address(), node());
-    let _server = start(address, &own, 1).unwrap();
-    let (mut one, mut two) = (System::new(1, "one", address), System::new(2, "two", address));
-    one.wait_up();
-    two.wait_up();
+    let server = Router::start();
+    let (mut one, mut two) = two(server.address, None);
     let mut sender = one.sender(2);
     for number in 0..100 {
         one.say(&mut sender, number);
@@ -84,81 +78,67 @@ fn packages_cross_from_system_to_system_and_what_is_not_there_is_answered() {
     // Nobody hosts this one; the answer says so.
     let mut nowhere = one.participant.sender(module(3)).unwrap();
     one.say(&mut nowhere, 8);
-    let answer = wait("an answer", || one.replies.try_receive().map(|package| package.body().to_vec()));
-    assert_eq!(String::from_utf8_lossy(&answer), "no-route");
+    assert_eq!(one.answer(), "no-route");
     // What one node cannot deliver itself is told by it.
     let mut absent = one.participant.sender(module(2).with_local(9)).unwrap();
     one.say(&mut absent, 9);
-    let answer = wait("an answer", || one.replies.try_receive().map(|package| package.body().to_vec()));
-    assert_eq!(String::from_utf8_lossy(&answer), "no-mailbox");
+    assert_eq!(one.answer(), "no-mailbox");
 }
 
 #[test]
 fn a_node_takes_commands_from_beyond_only_as_its_configuration_allows() {
-    let (address, (_folder, own)) = (address(), node());
-    let _server = start(address, &own, 1).unwrap();
-    let mut one = System::new(1, "one", address);
+    let server = Router::start();
+    let mut one = System::new(1, "one", server.address);
     let only_others = config::Access { class: module(2).class(), callers: vec![Class(101)], line: 12 };
     let admission = Admission { access: Access::new(&[only_others]), ..Admission::default() };
-    let mut two = System::guarded(2, "two", address, None, admission);
+    let mut two = System::guarded(2, "two", server.address, None, admission);
     one.wait_up();
     two.wait_up();
     let mut sender = one.sender(2);
     one.say(&mut sender, 1);
-    let answer = wait("an answer", || one.replies.try_receive().map(|package| package.body().to_vec()));
-    assert_eq!(String::from_utf8_lossy(&answer), "not-allowed, line 12");
+    assert_eq!(one.answer(), "not-allowed, line 12");
     assert_eq!(two.hear(), None);
 }
 
 #[test]
 fn a_server_that_dies_and_lives_again_costs_a_gap_and_nothing_else() {
-    let (address, (_folder, own)) = (address(), node());
-    let mut server = Some(start(address, &own, 1).unwrap());
-    let (one, mut two) = (System::new(1, "one", address), System::new(2, "two", address));
-    one.wait_up();
-    two.wait_up();
+    let mut server = Router::start();
+    let (one, mut two) = two(server.address, None);
     let (mut sender, mut number, mut last) = (one.sender(2), 0, None);
-    for incarnation in 2..6 {
-        // Under load until some came, then without a server while the load goes on.
+    let mut cross = |number: &mut u32, sender: &mut Sender| {
         let before = last;
         wait("packages that cross", || {
-            number += 1;
-            one.say(&mut sender, number);
+            *number += 1;
+            one.say(sender, *number);
             while let Some(heard) = two.hear() {
                 assert!(last.is_none_or(|last| heard > last), "in order, and none twice: {heard} after {last:?}");
                 last = Some(heard);
             }
             (last != before && last > Some(number.saturating_sub(20))).then_some(())
         });
-        drop(server.take());
+    };
+    for _ in 0..4 {
+        // Under load until some came, then without a server while the load goes on.
+        cross(&mut number, &mut sender);
+        server.end();
         for _ in 0..50 {
             number += 1;
             one.say(&mut sender, number);
             std::thread::sleep(Duration::from_millis(1));
         }
-        server = Some(wait("its port is free", || start(address, &own, incarnation).ok()));
+        server.begin_again(None);
         one.wait_up();
-        two.wait_up();
     }
-    wait("packages that cross again", || {
-        number += 1;
-        one.say(&mut sender, number);
-        while let Some(heard) = two.hear() {
-            assert!(last.is_none_or(|last| heard > last), "{heard} after {last:?}");
-            last = Some(heard);
-        }
-        (last > Some(number.saturating_sub(20))).then_some(())
-    });
+    cross(&mut number, &mut sender);
     wait("a connection to each incarnation", || (one.client.link().connections >= 5).then_some(()));
 }
 
 #[test]
 fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
-    let (address, (_folder, own)) = (address(), node());
-    let _server = start(address, &own, 1).unwrap();
-    let first = System::new(1, "the first", address);
+    let server = Router::start();
+    let first = System::new(1, "the first", server.address);
     first.wait_up();
-    let second = System::new(1, "the second", address);
+    let second = System::new(1, "the second", server.address);
     let why = |link: ClientLink| (!link.why.is_empty()).then_some(link.why);
     let why = wait("an objection", || why(second.client.link()));
     assert!(why.contains("hosted by the first"), "{why}");
@@ -169,17 +149,16 @@ fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
 
 #[test]
 fn a_client_of_another_installation_or_no_client_at_all_is_told_and_closed() {
-    let (address, (_folder, own)) = (address(), node());
-    let server = start(address, &own, 1).unwrap();
-    let told = Raw::new(address, 1, COMMON + 1).rest();
+    let server = Router::start();
+    let told = Raw::new(server.address, 1, COMMON + 1).rest();
     assert!(told.windows(14).any(|bytes| bytes == b"the TCP router"), "a refusal that names the end that differs");
-    let mut stranger = Raw(TcpStream::connect(address).unwrap());
+    let mut stranger = Raw(TcpStream::connect(server.address).unwrap());
     stranger.0.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
     stranger.0.write_all(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n").unwrap();
     assert!(stranger.rest().windows(4).any(|bytes| bytes == b"RpTc"), "a refusal");
     wait("both are counted", || (server.members().refused >= 2).then_some(()));
     // Half open: it said nothing after its hello, and nothing for good.
-    let mut silent = Raw::new(address, 2, COMMON);
+    let mut silent = Raw::new(server.address, 2, COMMON);
     wait("it takes part", || server.members().members.iter().any(|member| member.is_member).then_some(()));
     silent.rest();
     wait("it is gone", || server.members().members.is_empty().then_some(()));
@@ -187,18 +166,15 @@ fn a_client_of_another_installation_or_no_client_at_all_is_told_and_closed() {
 
 #[test]
 fn a_client_that_reads_nothing_holds_up_nobody() {
-    let (address, (_folder, own)) = (address(), node());
-    let server = start(address, &own, 1).unwrap();
-    let (one, mut two) = (System::new(1, "one", address), System::new(2, "two", address));
-    one.wait_up();
-    two.wait_up();
+    let server = Router::start();
+    let (one, mut two) = two(server.address, None);
     // It hosts names, and speaks now and then, but never reads.
-    let mut slow = Raw::new(address, 3, COMMON);
+    let mut slow = Raw::new(server.address, 3, COMMON);
     slow.hosts(3);
     wait("it hosts", || {
         server.members().members.iter().any(|member| member.system == 3 && member.ranges == 1).then_some(())
     });
-    let mut flood = Raw::new(address, 4, COMMON);
+    let mut flood = Raw::new(server.address, 4, COMMON);
     flood.hosts(4);
     let body = vec![0; 32 << 10];
     let head = Head {
@@ -231,9 +207,8 @@ fn a_client_that_reads_nothing_holds_up_nobody() {
 
 #[test]
 fn what_is_for_all_systems_comes_once_to_each() {
-    let (address, (_folder, own)) = (address(), node());
-    let _server = start(address, &own, 1).unwrap();
-    let mut systems = [1, 2, 3].map(|id| System::new(id, "a system", address));
+    let server = Router::start();
+    let mut systems = [1, 2, 3].map(|id| System::new(id, "a system", server.address));
     systems.iter().for_each(System::wait_up);
     let mut to_all = systems[0].sender(ALL_SYSTEMS);
     let mut to_each = [1, 2, 3].map(|id| systems[0].sender(id));

@@ -1,6 +1,6 @@
 //! Ends of two versions, and of two installations: each says so for itself.
 
-use crate::ground::{COMMON, PATIENCE, System, address, node, start, wait};
+use crate::ground::{COMMON, PATIENCE, Router, System, wait};
 use rohrpost_routers::session::frame::{HEAD_BYTES, SessionMessage, SessionRefusal, SessionRefusalReason, VERSION};
 use rohrpost_routers::tcp::LinkState;
 use std::io::{Read, Write};
@@ -10,20 +10,13 @@ use std::net::{TcpListener, TcpStream};
 const VERSION_AT: usize = HEAD_BYTES + 4;
 const OTHER: u8 = VERSION + 1;
 
-fn written(message: &SessionMessage<'_>) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    message.write(&mut bytes);
-    bytes
-}
-
 #[test]
 fn a_tcp_router_says_which_version_a_client_speaks_and_tells_it_its_own() {
-    let (address, (_folder, own)) = (address(), node());
-    let server = start(address, &own, 1).unwrap();
-    let mut hello = written(&SessionMessage::Hello(crate::sessions::hello(3, COMMON)));
+    let server = Router::start();
+    let mut hello = SessionMessage::Hello(crate::sessions::hello(3, COMMON)).to_bytes();
     assert_eq!(hello[VERSION_AT], VERSION);
     hello[VERSION_AT] = OTHER;
-    let mut client = TcpStream::connect(address).unwrap();
+    let mut client = TcpStream::connect(server.address).unwrap();
     client.set_read_timeout(Some(PATIENCE)).unwrap();
     client.write_all(&hello).unwrap();
     let mut told = Vec::new();
@@ -54,7 +47,7 @@ fn a_client_says_what_a_tcp_router_of_another_version_or_installation_objects_to
     ] {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let refusal = SessionRefusal { version, reason, yours: COMMON, ours: COMMON + 1, text: "north" };
-        let refusal = written(&SessionMessage::Refusal(refusal));
+        let refusal = SessionMessage::Refusal(refusal).to_bytes();
         let client = System::new(1, "one", listener.local_addr().unwrap());
         listener.set_nonblocking(true).unwrap();
         let (mut server, _) = wait("the client connects", || listener.accept().ok());
@@ -72,11 +65,10 @@ fn a_client_says_what_a_tcp_router_of_another_version_or_installation_objects_to
 
 #[test]
 fn of_two_installations_both_ends_name_the_digests_that_differ() {
-    let (address, (_folder, own)) = (address(), node());
-    let server = start(address, &own, 1).unwrap();
-    let mut client = TcpStream::connect(address).unwrap();
+    let server = Router::start();
+    let mut client = TcpStream::connect(server.address).unwrap();
     client.set_read_timeout(Some(PATIENCE)).unwrap();
-    client.write_all(&written(&SessionMessage::Hello(crate::sessions::hello(3, COMMON + 1)))).unwrap();
+    client.write_all(&SessionMessage::Hello(crate::sessions::hello(3, COMMON + 1)).to_bytes()).unwrap();
     let mut told = Vec::new();
     client.read_to_end(&mut told).unwrap();
     assert_eq!(told[VERSION_AT + 1], SessionRefusalReason::Common as u8);

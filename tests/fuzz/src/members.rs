@@ -110,22 +110,23 @@ impl World {
 
     fn check(&self) {
         assert!(self.server.clients().count() <= PLACES);
-        let hosted_by = |client| self.server.table().hosted().filter(move |(host, _)| *host == client);
-        let members = || self.server.views().filter(|view| view.is_member);
+        let (table, mut hosted) = (self.server.table(), 0);
+        let members = || self.server.snapshots(self.now_ns).filter(|(_, member)| member.is_member);
         assert!(members().count() <= 3);
-        for view in members() {
-            let mut ranges = 0;
-            for (_, range) in hosted_by(view.index) {
-                ranges += 1;
-                assert!(range.first.system() == view.system && range.last.system() == view.system);
+        for (client, member) in members() {
+            let ranges = table.ranges_of(client);
+            for range in ranges {
+                assert!(range.first.system() == member.system && range.last.system() == member.system);
+                assert_eq!([range.first, range.last].map(|name| table.client_of(name)), [Some(client); 2]);
             }
-            assert_eq!(ranges, view.ranges);
+            assert_eq!(ranges.len() as u64, member.ranges);
+            hosted += ranges.len();
         }
+        assert_eq!(table.len(), hosted, "nobody else hosts anything");
         for (client, _, state) in self.server.clients() {
             let bytes = self.server.bytes_of(client);
             assert!(bytes <= BYTES_MAX, "{bytes} B for one connection");
-            let hosts = hosted_by(client).count();
-            assert!(hosts == 0 || state == MemberState::Member, "only members host names");
+            assert!(table.ranges_of(client).is_empty() || state == MemberState::Member, "only members host names");
         }
         let (mut packages, mut known) = (0, self.server.waiting() as u64);
         for (priority, class) in self.server.counts().classes() {

@@ -100,7 +100,7 @@ impl World {
 
     fn ask(&mut self, own: NodeIndex) {
         let mut room = [0; HELLO_DATAGRAM_BYTES];
-        let said = self.routers[usize::from(own)].sealing[0].ask(1 - own, &mut room);
+        let said = self.routers[usize::from(own)].all.ask(1 - own, &mut room);
         self.hello(own, &room[..said.unwrap_or_default()]);
     }
 

@@ -6,7 +6,7 @@ use rohrpost_routers::report::NotDelivered;
 use rohrpost_routers::session::client::{self, Client, ClientSettings};
 use rohrpost_routers::session::frame::{Carried, HEAD_BYTES, LENGTH_MAX, SessionFrameHead, SessionMessage};
 use rohrpost_routers::session::server::{self, OwnNodes, Server, ServerSettings, ServerStep};
-use rohrpost_routers::session::{Cause, ErrorReplies, ReplicaEnd};
+use rohrpost_routers::session::{Cause, EndHost};
 
 pub(crate) const MS: u64 = 1_000_000;
 pub(crate) const BEGIN_NS: u64 = 1000 * MS;
@@ -29,11 +29,7 @@ fn frames(mut stream: &[u8]) {
         let Some((frame, behind)) = rest.split_at_checked(head.length) else { return };
         match SessionMessage::parse(head, frame) {
             Ok(SessionMessage::Package(carried)) => assert_eq!(usize::from(carried.head.len), carried.body.len()),
-            Ok(message) => {
-                let mut written = Vec::new();
-                message.write(&mut written);
-                assert_eq!(written, stream[..HEAD_BYTES + head.length]);
-            }
+            Ok(message) => assert_eq!(message.to_bytes(), stream[..HEAD_BYTES + head.length]),
             Err(bad) => return assert!(!bad.to_string().is_empty()),
         }
         stream = behind;
@@ -43,9 +39,7 @@ fn frames(mut stream: &[u8]) {
 /// Ignores all events.
 pub(crate) struct Deaf;
 
-impl ReplicaEnd for Deaf {}
-
-impl ErrorReplies for Deaf {
+impl EndHost for Deaf {
     fn answer(&mut self, _: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {
         answer.extend(why.word().bytes());
         true

@@ -84,7 +84,7 @@ impl SealedRouter {
     /// Panics if one does not take the other's hello.
     pub fn acquaint(&mut self, other: &mut Self, now_ns: u64) {
         let mut hello = [0; HELLO_DATAGRAM_BYTES];
-        assert!(self.sealing.ask(other.own, &mut hello).is_some(), "it can ask");
+        assert!(self.peer_sessions.ask(other.own, &mut hello).is_some(), "it can ask");
         let replied = [other.take(now_ns, &mut hello), self.take(now_ns, &mut hello), other.take(now_ns, &mut hello)];
         assert_eq!(replied, [true, true, false], "asked, answered, proved");
     }

@@ -12,8 +12,8 @@ use rohrpost_modules::interfaces::{
 use rohrpost_modules::runtime::Context;
 use rohrpost_modules::{Module, ModuleError, NoSettings};
 use rohrpost_routers::session::frame::Range;
-use rohrpost_routers::session::server::{Names, OwnNode, OwnNodes, ServerSettings};
-use rohrpost_routers::tcp::{MemberSnapshot, ServerParts, ServerSeal, ServerShell};
+use rohrpost_routers::session::server::{MemberSnapshot, Names, OwnNode, OwnNodes, ServerSettings};
+use rohrpost_routers::tcp::{ServerParts, ServerSeal, ServerShell};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;

@@ -1,15 +1,45 @@
 //! By a session: one record leaves, the newest is next, and sampling is as on the LAN.
 
-use super::{CAMERA, FirstByte, Ground, ID, SHAPE, at, image, time, words};
+use super::{CAMERA, FirstByte, Ground, ID, SHAPE, at, image, sequences, time, words};
 use crate::frame::{DescriptionPart, FrameKind, NodeIndex, RecordPart, ReplicaFrame};
 use crate::harness::{MS, START};
 use crate::replication::{LINE_PART_ROOM, LineReplicas, LineSettings, ReplicaLoss, ReplicaSettings};
 use rohrpost_config::Sampling;
-use rohrpost_mailbox::{Missed, Next, StreamReader, StreamWriter};
+use rohrpost_mailbox::{Missed, StreamReader, StreamWriter};
+use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 const SERVER: NodeIndex = 0;
 const LAPTOP: NodeIndex = 1;
+
+/// An end of lines, with what it sends and what it has.
+pub(super) fn end(ground: &Ground, own: NodeIndex, sent: ReplicaSettings, received: ReplicaSettings) -> LineReplicas {
+    let (sent, received) = (vec![sent], vec![received]);
+    let settings = LineSettings { own, server: SERVER, nodes: Vec::new(), sent, received };
+    LineReplicas::new(&settings, ground.join(), Arc::new(FirstByte), Box::new(time))
+}
+
+/// The next part arrives, if there is one.
+pub(super) fn carry_one(
+    now_ns: u64,
+    (from, here): (NodeIndex, &mut LineReplicas),
+    (to, there): (NodeIndex, &mut LineReplicas),
+) -> bool {
+    let mut content = [0; LINE_PART_ROOM];
+    here.refresh(now_ns);
+    let Some((kind, length)) = here.next_before(now_ns, (to, LEVELS as u8), &mut content) else { return false };
+    let part = match kind {
+        FrameKind::RecordPart => ReplicaFrame::Record(RecordPart::parse(&content[..length]).unwrap()),
+        _ => ReplicaFrame::Description(DescriptionPart::parse(&content[..length]).unwrap()),
+    };
+    there.take(now_ns, (Some(from), 7), &part);
+    true
+}
+
+/// Records of the first stream that were left out by sampling, and passed over for newer ones.
+pub(super) fn skipped(line: &LineReplicas) -> [u64; 2] {
+    [ReplicaLoss::Sampled, ReplicaLoss::Passed].map(|cause| line.counts().sent[0].lost.of(cause))
+}
 
 /// A line to a laptop.
 struct Line {
@@ -26,13 +56,8 @@ impl Line {
     fn new(replica: ReplicaSettings) -> Self {
         let replica = |to| ReplicaSettings { node: SERVER, to, ..replica.clone() };
         let grounds = [Ground::new(), Ground::new()];
-        let end = |own: NodeIndex, sent, received| {
-            let (sent, received) = (vec![replica(sent)], vec![replica(received)]);
-            let settings = LineSettings { own, server: SERVER, nodes: Vec::new(), sent, received };
-            let participant = grounds[usize::from(own)].join();
-            LineReplicas::new(&settings, participant, Arc::new(FirstByte), Box::new(time))
-        };
-        let (here, there) = (end(SERVER, 1 << LAPTOP, 0), end(LAPTOP, 0, 1 << LAPTOP));
+        let here = end(&grounds[0], SERVER, replica(1 << LAPTOP), replica(0));
+        let there = end(&grounds[1], LAPTOP, replica(0), replica(1 << LAPTOP));
         grounds[0].join().describe_replicas(CAMERA, &words(1)).unwrap();
         let writer = grounds[0].join().stream_writer(ID, SHAPE).unwrap();
         let reader = grounds[1].join().stream_reader(ID).unwrap();
@@ -53,15 +78,7 @@ impl Line {
 
     /// The next part arrives, if there is one.
     fn carry_one(&mut self) -> bool {
-        let mut content = [0; LINE_PART_ROOM];
-        self.here.refresh(self.now_ns);
-        let Some((kind, length)) = self.here.next(self.now_ns, LAPTOP, &mut content) else { return false };
-        let part = match kind {
-            FrameKind::RecordPart => ReplicaFrame::Record(RecordPart::parse(&content[..length]).unwrap()),
-            _ => ReplicaFrame::Description(DescriptionPart::parse(&content[..length]).unwrap()),
-        };
-        self.there.take(self.now_ns, (Some(SERVER), 7), &part);
-        true
+        carry_one(self.now_ns, (SERVER, &mut self.here), (LAPTOP, &mut self.there))
     }
 
     /// All that leaves arrives; the sequences of what can be read then.
@@ -72,20 +89,7 @@ impl Line {
 
     /// The sequences of what can be read.
     fn read(&mut self) -> Vec<u64> {
-        let mut all = Vec::new();
-        loop {
-            match self.reader.try_next().unwrap() {
-                Next::Record(record) => all.push(record.info().sequence),
-                Next::Lost(_) => {}
-                Next::Nothing => return all,
-            }
-        }
-    }
-
-    /// Records that were left out by sampling, and passed over for newer ones.
-    fn left_out(&self) -> [u64; 2] {
-        let counts = self.here.counts().sent[0].clone();
-        [ReplicaLoss::Sampled, ReplicaLoss::Passed].map(|cause| counts.lost.of(cause))
+        sequences(&mut self.reader)
     }
 }
 
@@ -104,7 +108,7 @@ fn the_newest_of_what_waits_leaves_and_what_sampling_leaves_out_is_told_apart() 
         assert_eq!(line.carry(), first, "{sampling}, changed: {changed}");
         line.write(&burst);
         assert_eq!(line.carry(), second, "{sampling}, changed: {changed}");
-        assert_eq!(line.left_out(), left_out, "{sampling}, changed: {changed}");
+        assert_eq!(skipped(&line.here), left_out, "{sampling}, changed: {changed}");
         line.write(&burst[..1]);
         line.here.refresh(line.now_ns);
         // Twelve is one of three; a second has not passed.

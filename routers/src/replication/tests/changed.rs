@@ -20,8 +20,7 @@ fn arrive(replica: ReplicaSettings, bodies: &[&[u8]]) -> (Vec<u64>, u64) {
         writer.write(at(100 + step), body).unwrap();
         holder.take_all(now_ns, &origin.leave(&mut now_ns));
     }
-    let (all, _) = read(&mut reader);
-    (all.into_iter().map(|(sequence, _)| sequence).collect(), origin.lost(ReplicaLoss::Sampled))
+    (sequences(&mut reader), origin.lost(ReplicaLoss::Sampled))
 }
 
 #[test]

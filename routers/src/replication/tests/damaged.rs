@@ -6,7 +6,7 @@ use crate::frame::HEAD_BYTES;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Attempts in a normal run; `HOSTILE_DATAGRAMS` says another number.
+/// Attempts in a normal run.
 const NORMALLY: usize = 100_000;
 
 /// Counts what is taken as a part, a description or a request.
@@ -32,37 +32,36 @@ impl Deliver for Taken {
     fn event(&mut self, _: RouterEvent) {}
 }
 
-/// What the wire makes of a datagram; it may be as it was.
-fn damaged(chance: &mut ChaCha8Rng, all: &[Vec<u8>]) -> Vec<u8> {
-    let one_of = |chance: &mut ChaCha8Rng| chance.random_range(0..all.len());
-    let mut datagram = all[one_of(chance)].clone();
+/// How often such a test tries; `HOSTILE_DATAGRAMS` says another number than what is normal.
+pub(super) fn attempts() -> usize {
+    let wanted = std::env::var("HOSTILE_DATAGRAMS").ok();
+    wanted.map_or(NORMALLY, |wanted| wanted.parse().expect("HOSTILE_DATAGRAMS is a number"))
+}
+
+/// Flips a few bits of a datagram, swaps two stretches, cuts or extends it, or puts its head before the rest of another.
+pub(super) fn alter(chance: &mut ChaCha8Rng, datagram: &mut Vec<u8>, other: &[u8]) {
     let len = datagram.len();
-    match chance.random_range(0..6) {
+    match chance.random_range(0..5) {
         0 => {
             for _ in 0..=chance.random_range(0..8) {
                 datagram[chance.random_range(0..len)] ^= 1 << chance.random_range(0..8);
             }
         }
         1 => {
-            let [one, other] = [0, 0].map(|_| chance.random_range(0..len));
-            datagram.swap(one, other);
-        }
-        // Two stretches of it.
-        2 => {
-            let bytes = chance.random_range(1..=len / 2);
+            let bytes = if chance.random_bool(0.5) { 1 } else { chance.random_range(1..=len / 2) };
             let at = chance.random_range(0..=len - 2 * bytes);
-            let (one, other) = datagram[at..at + 2 * bytes].split_at_mut(bytes);
-            one.swap_with_slice(other);
+            let behind = chance.random_range(at + bytes..=len - bytes);
+            let (one, other) = datagram.split_at_mut(behind);
+            one[at..at + bytes].swap_with_slice(&mut other[..bytes]);
         }
-        3 => datagram.truncate(chance.random_range(0..len)),
-        4 => datagram.extend((0..=chance.random_range(0..20)).map(|byte| byte as u8)),
-        // The head of one, the rest of another.
-        _ => {
-            let rest = &all[one_of(chance)][HEAD_BYTES..];
-            datagram.splice(HEAD_BYTES.., rest.iter().copied());
-        }
+        2 => datagram.truncate(chance.random_range(0..len)),
+        3 => datagram.extend((0..=chance.random_range(0..20)).map(|byte| byte as u8)),
+        _ => drop(datagram.splice(HEAD_BYTES.., other[HEAD_BYTES..].iter().copied())),
     }
-    datagram
+}
+
+pub(super) fn one_of<'a>(chance: &mut ChaCha8Rng, all: &'a [Vec<u8>]) -> &'a Vec<u8> {
+    &all[chance.random_range(0..all.len())]
 }
 
 /// All that two routers say to each other of records of many sizes.
@@ -90,16 +89,16 @@ fn said() -> Vec<Vec<u8>> {
 
 #[test]
 fn of_what_the_wire_damages_no_part_is_taken() {
-    let wanted = std::env::var("HOSTILE_DATAGRAMS").ok();
-    let attempts = wanted.map_or(NORMALLY, |wanted| wanted.parse().expect("HOSTILE_DATAGRAMS is a number"));
-    let all = said();
+    let (attempts, all) = (attempts(), said());
     let kinds: std::collections::BTreeSet<u8> = all.iter().map(|datagram| datagram[3]).collect();
     assert_eq!(kinds.len(), 3, "parts of records, of descriptions, and requests: {kinds:?}");
     let stats = Stats::new(&settings(HOLDER, 3), START);
     let mut inbound = Inbound::new(&settings(HOLDER, 3), stats);
     let (mut chance, mut taken, mut as_it_was) = (ChaCha8Rng::seed_from_u64(22), Taken::default(), 0);
     for attempt in 0..attempts {
-        let bytes = damaged(&mut chance, &all);
+        let mut bytes = one_of(&mut chance, &all).clone();
+        let other = one_of(&mut chance, &all);
+        alter(&mut chance, &mut bytes, other);
         if all.contains(&bytes) {
             as_it_was += 1;
             continue;

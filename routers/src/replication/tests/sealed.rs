@@ -1,6 +1,7 @@
 //! Both halves where datagrams are sealed, and an attacker that has recorded all of them: what it alters, mixes, brings
 //! again or brings to another port is not taken, and disturbs nothing.
 
+use super::damaged::{alter, attempts, one_of};
 use super::*;
 use crate::frame::{FrameKind, HEAD_BYTES, write_check};
 use crate::harness::Log;
@@ -15,8 +16,6 @@ use rand_chacha::ChaCha8Rng;
 use rohrpost_network::Security;
 use std::num::NonZeroU8;
 
-/// Attempts in a normal run; `HOSTILE_DATAGRAMS` says another number.
-const NORMALLY: usize = 100_000;
 /// Between two records.
 const ATTEMPTS: usize = 1000;
 
@@ -42,7 +41,7 @@ impl End {
         let hears =
             |end: &Self| (Handshake::new(&end.all, [end.settings.own; 32]), Opening::new(&end.all, Port::Packages));
         let (mut ends, mut hello) = ([other, self].map(hears), [0; HELLO_DATAGRAM_BYTES]);
-        Sealing::new(&self.all, Port::Packages).ask(other.settings.own, &mut hello).unwrap();
+        self.all.ask(other.settings.own, &mut hello).unwrap();
         for listens in [0, 1, 0] {
             let (handshake, opening) = &mut ends[listens];
             let Ok(Opened::Hello(head, asked)) = opening.open(&mut hello) else { panic!("no hello") };
@@ -155,41 +154,21 @@ struct Attacker {
 }
 
 impl Attacker {
-    fn one_of(chance: &mut ChaCha8Rng, all: &[Vec<u8>]) -> Vec<u8> {
-        all[chance.random_range(0..all.len())].clone()
-    }
-
     fn datagram(&mut self) -> Vec<u8> {
         let Self { chance, recorded, elsewhere } = self;
-        let mut datagram = Self::one_of(chance, recorded);
-        let len = datagram.len();
+        let mut datagram = one_of(chance, recorded).clone();
         match chance.random_range(0..8) {
             0 => return datagram,
-            1 => return Self::one_of(chance, elsewhere),
-            2 => {
-                for _ in 0..=chance.random_range(0..3) {
-                    datagram[chance.random_range(0..len)] ^= 1 << chance.random_range(0..8);
-                }
-            }
-            // Two bytes, or two stretches of them.
-            3 => {
-                let bytes = chance.random_range(1..=len / 2);
-                let at = chance.random_range(0..=len - 2 * bytes);
-                let (one, other) = datagram[at..at + 2 * bytes].split_at_mut(bytes);
-                one.swap_with_slice(other);
-            }
-            4 => datagram.truncate(chance.random_range(0..len)),
-            5 => datagram.extend((0..=chance.random_range(0..20)).map(|byte| byte as u8)),
-            // The head of one, the rest of another.
-            6 => {
-                let of = if chance.random_bool(0.5) { recorded } else { elsewhere };
-                let rest = Self::one_of(chance, of);
-                datagram.splice(HEAD_BYTES.., rest[HEAD_BYTES..].iter().copied());
-            }
+            1 => return one_of(chance, elsewhere).clone(),
             // Another incarnation, or another sequence, by which nothing came before.
-            _ => {
+            2 => {
                 let at = if chance.random_bool(0.5) { 16 } else { 24 };
                 datagram[at..at + 8].copy_from_slice(&(chance.random::<u64>() >> 16).to_le_bytes());
+            }
+            _ => {
+                let of = if chance.random_bool(0.5) { recorded } else { elsewhere };
+                let other = one_of(chance, of);
+                alter(chance, &mut datagram, other);
             }
         }
         if datagram.len() >= HEAD_BYTES && chance.random_bool(0.8) {
@@ -201,8 +180,7 @@ impl Attacker {
 
 #[test]
 fn of_what_was_recorded_and_altered_no_part_is_taken() {
-    let wanted = std::env::var("HOSTILE_DATAGRAMS").ok();
-    let attempts = wanted.map_or(NORMALLY, |wanted| wanted.parse().expect("HOSTILE_DATAGRAMS is a number"));
+    let attempts = attempts();
     let replicas = [image()];
     let (mut origin, mut holder, mut writer) = met(&replicas);
     let (mut now_ns, mut reader) = (START, holder.ground.join().stream_reader(ID).unwrap());

@@ -84,7 +84,7 @@ fn stepped(stepped: Stepped) -> (Vec<u64>, u64, u64) {
             }
             holder.pass(now_ns);
             let before = sequences.len();
-            sequences.extend(read(&mut reader).0.into_iter().map(|(sequence, _)| sequence));
+            sequences.extend(super::sequences(&mut reader));
             assert_eq!(sequences.len(), before + 1, "record {step} is read as soon as it is written");
         }
     });

@@ -68,11 +68,7 @@ fn an_unknown_peer_is_challenged_again_and_again_and_one_with_another_incarnatio
     let now_ns = START + 2 * ASK_EVERY_NS;
     assert_eq!(a.ask(now_ns).iter().map(|(to, _)| *to).collect::<Vec<_>>(), [2], "the other is known");
     // b begins anew, and a does not know it.
-    let mut sealing = Sealing::new(&a.all, Port::Packages);
-    let mut datagram = [0; 80];
-    let head =
-        FrameHead { kind: FrameKind::Alive, system: 1, from: 0, to: 1, digest: 7, incarnation: 100, sequence: 0 };
-    sealing.seal(&head, &mut datagram).unwrap();
+    let datagram = sealed_alive(&mut Sealing::new(&a.all, Port::Packages), 0);
     let mut again = Router::new(1);
     again.ask(now_ns);
     assert!(again.take(now_ns, 0, &datagram).is_none());
@@ -137,11 +133,16 @@ fn acquaint_at(now_ns: u64, a: &mut Router, b: &mut Router) {
 }
 
 /// Of node 0, that it is still there.
-fn sealed_alive(sealing: &mut Sealing, sequence: u64) -> Vec<u8> {
+fn alive(sequence: u64) -> (FrameHead, Vec<u8>) {
     let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
-    let mut datagram = [&[0; HEAD_BYTES], &told[..], &[0; TAG_BYTES]].concat();
     let kind = FrameKind::Alive;
     let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence };
+    (head, told.to_vec())
+}
+
+fn sealed_alive(sealing: &mut Sealing, sequence: u64) -> Vec<u8> {
+    let (head, told) = alive(sequence);
+    let mut datagram = [&[0; HEAD_BYTES], &told[..], &[0; TAG_BYTES]].concat();
     sealing.seal(&head, &mut datagram).unwrap();
     datagram
 }
@@ -183,12 +184,8 @@ fn a_cause_is_believed_of_the_silent_alone() {
     let mut version = other_id.clone();
     version[2] = VERSION + 1;
     crate::frame::write_check(&mut version);
-    let unsealed = {
-        let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
-        let kind = FrameKind::Alive;
-        let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence: 0 };
-        [&head.to_bytes(&[&told])[..], &told].concat()
-    };
+    let (head, told) = alive(0);
+    let unsealed = [&head.to_bytes(&[&told])[..], &told].concat();
     let state = |b: &Router, now_ns| b.end.stats.state(0, now_ns);
     b.take(START, 0, &other_key);
     assert_eq!(state(&b, START), PeerLinkState::Unknown, "it may be heard yet, and packages go to it");

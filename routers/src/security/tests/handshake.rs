@@ -137,17 +137,13 @@ fn keys_are_changed_node_by_node_without_a_gap() {
         let mut why = None;
         // Two questions: one with each key.
         for _ in 0..2 {
-            for (asks, other) in [(&mut a, &mut b)] {
-                let mut hello = Some(asks.ask(other.own));
-                let mut is_for_other = true;
-                while let Some(said) = hello.take() {
-                    let listens = if is_for_other { &mut *other } else { &mut *asks };
-                    is_for_other = !is_for_other;
-                    match listens.greet(&said) {
-                        Ok((_, answer)) => hello = answer,
-                        Err(rejected) => why = Some(rejected),
-                    }
+            let (mut hello, mut is_for_b) = (Some(a.ask(1)), true);
+            while let Some(said) = hello.take() {
+                match if is_for_b { &mut b } else { &mut a }.greet(&said) {
+                    Ok((_, answer)) => hello = answer,
+                    Err(rejected) => why = Some(rejected),
                 }
+                is_for_b = !is_for_b;
             }
         }
         let there = a.seal(Port::Packages, 1, b"there");

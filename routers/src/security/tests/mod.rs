@@ -63,7 +63,7 @@ impl Router {
 
     pub(super) fn ask(&self, peer: NodeIndex) -> Vec<u8> {
         let mut datagram = [0; 100];
-        let bytes = self.sealing[0].ask(peer, &mut datagram).unwrap();
+        let bytes = self.all.ask(peer, &mut datagram).unwrap();
         datagram[..bytes].to_vec()
     }
 

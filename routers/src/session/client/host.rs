@@ -1,8 +1,8 @@
 //! What a client needs from the code that runs it, and tells it.
 
 use crate::report::NotDelivered;
+use crate::session::EndHost;
 use crate::session::frame::{BadSessionFrame, Carried, RegistrationVerdict, SessionRefusal};
-use crate::session::{ErrorReplies, ReplicaEnd};
 
 /// A change that people are told once.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -20,7 +20,7 @@ pub enum ClientEvent<'a> {
 }
 
 /// What a client needs from the code that runs it.
-pub trait ClientHost: ErrorReplies + ReplicaEnd {
+pub trait ClientHost: EndHost {
     /// Puts a package that came into its mailbox. Its `published_ns` is an estimate by the monotonic clock here.
     ///
     /// # Errors

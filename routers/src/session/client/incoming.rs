@@ -95,7 +95,7 @@ impl Client {
         let head = capped(&carried.head);
         let carried = Carried { head, ..*carried };
         self.inn.came(head.priority);
-        let Some(session) = self.session(now_ns) else { return };
+        let Some(session) = self.estimate.session(now_ns) else { return };
         // As old as it may be at most: a command that came too late must not be run.
         let oldest_ns = session.ns.saturating_add(session.error_ns).saturating_sub(carried.published_ns);
         let shift = i128::from(now_ns) - i128::from(session.ns);

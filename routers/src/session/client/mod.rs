@@ -16,7 +16,7 @@ pub use backoff::BACKOFF_MAX_NS;
 pub use host::{ClientEvent, ClientHost};
 
 use super::counts::{Cause, SessionCounts};
-use super::estimate::{Bounded, ServerClockEstimate};
+use super::estimate::ServerClockEstimate;
 use super::frame::{Range, SessionHello, SessionMessage, SessionRefusalReason};
 use super::outgoing::Outgoing;
 use super::splitter::Splitter;
@@ -24,7 +24,7 @@ use super::{HANDSHAKE_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
 use crate::admission::Admission;
 use asking::Asking;
 use backoff::Backoff;
-use rohrpost_mailbox::{Head, TimeRecord};
+use rohrpost_mailbox::Head;
 
 /// A connection is made within so long, or not at all.
 const CONNECT_MAX_NS: u64 = 5_000_000_000;
@@ -214,29 +214,14 @@ impl Client {
         matches!(self.state, ClientState::Handshake { .. } | ClientState::Member)
     }
 
-    /// The shortest recent round trip, ns.
-    pub fn round_trip_ns(&self) -> Option<u64> {
-        self.estimate.round_trip_ns()
-    }
-
-    /// The server's session clock.
-    pub fn session(&self, now_ns: u64) -> Option<Bounded> {
-        self.estimate.session(now_ns)
-    }
-
-    /// System time as the server has it, with what the way adds to its bound.
-    pub fn system_time(&self, now_ns: u64) -> Option<TimeRecord> {
-        self.estimate.system(now_ns)
+    /// What it knows of the server's clocks, with what the way adds to their bounds.
+    pub fn clock(&self) -> &ServerClockEstimate {
+        &self.estimate
     }
 
     /// What was heard of the server's clocks does not count any more: this computer slept, or its clock is slewed.
     pub fn forget_time(&mut self) {
         self.estimate.forget();
-    }
-
-    /// How many answers the server gave about its clocks in this incarnation of it.
-    pub fn answers(&self) -> u64 {
-        self.estimate.answers()
     }
 
     /// Bytes of memory that what waits takes up.

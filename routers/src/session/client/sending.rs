@@ -50,7 +50,7 @@ impl Client {
     /// From our clock to the server's session clock, as long as packages may leave: to the earliest that it may be
     /// there, so that no package looks younger than it is.
     fn shift_ns(&self, now_ns: u64) -> Option<i64> {
-        let session = self.session(now_ns).filter(|_| self.is_up())?;
+        let session = self.estimate.session(now_ns).filter(|_| self.is_up())?;
         let earliest_ns = session.ns.saturating_sub(session.error_ns);
         Some((i128::from(earliest_ns) - i128::from(now_ns)).clamp(i64::MIN.into(), i64::MAX.into()) as i64)
     }

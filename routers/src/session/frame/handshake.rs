@@ -125,33 +125,23 @@ pub enum SessionRefusalReason {
 }
 
 impl SessionRefusalReason {
-    const ALL: [Self; 10] = [
-        Self::Version,
-        Self::Common,
-        Self::System,
-        Self::Full,
-        Self::Replaced,
-        Self::Damaged,
-        Self::Silent,
-        Self::Stalled,
-        Self::Ending,
-        Self::Certificate,
+    const WORDS: [(Self, &'static str); 10] = [
+        (Self::Version, "version"),
+        (Self::Common, "common-digest"),
+        (Self::System, "system-digest"),
+        (Self::Full, "full"),
+        (Self::Replaced, "replaced"),
+        (Self::Damaged, "damaged"),
+        (Self::Silent, "silent"),
+        (Self::Stalled, "stalled"),
+        (Self::Ending, "ending"),
+        (Self::Certificate, "certificate"),
     ];
 
     /// A word for people and programs.
     pub const fn word(self) -> &'static str {
-        match self {
-            Self::Version => "version",
-            Self::Common => "common-digest",
-            Self::System => "system-digest",
-            Self::Full => "full",
-            Self::Replaced => "replaced",
-            Self::Damaged => "damaged",
-            Self::Silent => "silent",
-            Self::Stalled => "stalled",
-            Self::Ending => "ending",
-            Self::Certificate => "certificate",
-        }
+        // They count from 1.
+        Self::WORDS[self as usize - 1].1
     }
 }
 
@@ -176,8 +166,8 @@ impl<'a> SessionRefusal<'a> {
             return Err(BadSessionFrame::Foreign);
         }
         let (version, reason) = (fields.byte()?, fields.byte()?);
-        let reason = SessionRefusalReason::ALL.into_iter().find(|known| *known as u8 == reason);
-        let reason = reason.ok_or(BadSessionFrame::Damaged("unknown reason of a refusal"))?;
+        let reason = SessionRefusalReason::WORDS.into_iter().find(|(known, _)| *known as u8 == reason);
+        let (reason, _) = reason.ok_or(BadSessionFrame::Damaged("unknown reason of a refusal"))?;
         fields.zeroes::<2>()?;
         Ok(Self { version, reason, yours: fields.long()?, ours: fields.long()?, text: fields.text(NAME_BYTES_MAX)? })
     }

@@ -181,6 +181,13 @@ impl<'a> SessionMessage<'a> {
         Ok(message)
     }
 
+    /// The frame alone.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        self.write(&mut bytes);
+        bytes
+    }
+
     /// Appends the frame.
     pub fn write(&self, into: &mut Vec<u8>) {
         match self {
@@ -192,16 +199,17 @@ impl<'a> SessionMessage<'a> {
             Self::Package(carried) => frame(into, SessionFrameKind::Package, carried.hops, |into| carried.write(into)),
             Self::Ask(asked_ns) => frame(into, SessionFrameKind::Ask, 0, |into| into.extend(asked_ns.to_le_bytes())),
             Self::Answer(answer) => frame(into, SessionFrameKind::Answer, 0, |into| answer.write(into)),
-            Self::Record(part) => frame(into, SessionFrameKind::RecordPart, 0, |into| {
-                into.extend(part.head_bytes());
-                into.extend(part.bytes);
-            }),
-            Self::Description(part) => frame(into, SessionFrameKind::Description, 0, |into| {
-                into.extend(part.head_bytes());
-                into.extend(part.bytes);
-            }),
+            Self::Record(part) => part_frame(into, SessionFrameKind::RecordPart, &part.head_bytes(), part.bytes),
+            Self::Description(part) => part_frame(into, SessionFrameKind::Description, &part.head_bytes(), part.bytes),
         }
     }
+}
+
+fn part_frame(into: &mut Vec<u8>, kind: SessionFrameKind, head: &[u8], bytes: &[u8]) {
+    frame(into, kind, 0, |into| {
+        into.extend(head);
+        into.extend(bytes);
+    });
 }
 
 fn frame(into: &mut Vec<u8>, kind: SessionFrameKind, hops: u8, rest: impl FnOnce(&mut Vec<u8>)) {

@@ -2,12 +2,6 @@ use super::*;
 use proptest::prelude::*;
 use rohrpost_mailbox::{Head, Name, Type};
 
-fn written(message: &SessionMessage<'_>) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    message.write(&mut bytes);
-    bytes
-}
-
 fn read(bytes: &[u8]) -> Result<SessionMessage<'_>, BadSessionFrame> {
     let (head, rest) = bytes.split_first_chunk().ok_or(BadSessionFrame::Damaged("short"))?;
     let head = SessionFrameHead::parse(head, LENGTH_MAX)?;
@@ -83,13 +77,13 @@ fn each(check: impl Fn(&SessionMessage<'_>)) {
 
 #[test]
 fn what_is_written_is_read() {
-    each(|message| assert_eq!(read(&written(message)), Ok(*message)));
+    each(|message| assert_eq!(read(&message.to_bytes()), Ok(*message)));
 }
 
 #[test]
 fn a_frame_that_is_cut_short_is_damaged() {
     each(|message| {
-        let bytes = written(message);
+        let bytes = message.to_bytes();
         for length in 0..bytes.len() - HEAD_BYTES {
             // Texts and parts may be shorter, and ranges fewer.
             let mut cut = bytes[..HEAD_BYTES + length].to_vec();
@@ -116,7 +110,7 @@ fn a_stream_of_something_else_is_told_from_another_version() {
     let hello = "GET / HTTP/1.1\r\n";
     assert_eq!(read(hello.as_bytes()), Err(BadSessionFrame::Damaged("unknown kind")));
     each(|message| {
-        let mut bytes = written(message);
+        let mut bytes = message.to_bytes();
         if matches!(message, SessionMessage::Hello(_) | SessionMessage::Welcome(_)) {
             bytes[HEAD_BYTES + 4] = 9;
             assert_eq!(read(&bytes), Err(BadSessionFrame::Version(9)));
@@ -155,7 +149,7 @@ proptest! {
         bytes.extend(rest);
         // The head of a package may be in the other byte order.
         if let Ok(message) = read(&bytes) && kind != SessionFrameKind::Package as u8 {
-            prop_assert_eq!(&written(&message), &bytes, "{:?}", message);
+            prop_assert_eq!(&message.to_bytes(), &bytes, "{:?}", message);
         }
     }
 }

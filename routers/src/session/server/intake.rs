@@ -11,13 +11,6 @@ use crate::session::{ClientIndex, LOOK_EVERY_NS};
 /// Time that a refused client has to read the reason.
 const LEAVE_WITHIN_NS: u64 = 5 * LOOK_EVERY_NS;
 
-/// What differs, and the end that has the right one.
-struct Difference {
-    reason: SessionRefusalReason,
-    digests: (u64, u64),
-    holder: String,
-}
-
 impl Server {
     /// Takes bytes of a client's stream, split anywhere.
     pub fn received(&mut self, now_ns: u64, client: ClientIndex, mut bytes: &[u8], host: &mut impl ServerHost) {
@@ -82,8 +75,8 @@ impl Server {
                 Some(_) => {}
             }
         }
-        if let Some(Difference { reason, digests, holder }) = self.difference(hello) {
-            return self.refuse(now_ns, client, reason, digests, &holder, host);
+        if let Some(PendingRefusal { reason, digests, text }) = self.difference(hello) {
+            return self.refuse(now_ns, client, reason, digests, &text, host);
         }
         let owner = self.member(client).map(|member| &member.principal);
         let older = owner.and_then(|owner| self.places.of_incarnation(owner, hello.incarnation));
@@ -102,22 +95,19 @@ impl Server {
         self.is_due(client);
     }
 
-    fn difference(&self, hello: &SessionHello<'_>) -> Option<Difference> {
+    /// What differs, and the end that has the right one.
+    fn difference(&self, hello: &SessionHello<'_>) -> Option<PendingRefusal> {
         let settings = &self.settings;
+        let differs = |reason, digests, holder: &str| PendingRefusal { reason, digests, text: holder.to_owned() };
         if hello.common != settings.common {
-            let digests = (hello.common, settings.common);
-            return Some(Difference { reason: SessionRefusalReason::Common, digests, holder: settings.name.clone() });
+            return Some(differs(SessionRefusalReason::Common, (hello.common, settings.common), &settings.name));
         }
         let own = settings.system.filter(|(system, _)| *system == hello.system);
         let own = own.map(|(_, digest)| (settings.name.as_str(), digest));
         let first = || self.places.of_system(hello.system).and_then(|first| self.member(first));
         let held = own.or_else(|| first().map(|member| (member.name.as_str(), member.system_digest)));
         let (holder, digest) = held.filter(|(_, digest)| *digest != hello.system_digest)?;
-        Some(Difference {
-            reason: SessionRefusalReason::System,
-            digests: (hello.system_digest, digest),
-            holder: holder.to_owned(),
-        })
+        Some(differs(SessionRefusalReason::System, (hello.system_digest, digest), holder))
     }
 
     fn refuse_bad(&mut self, now_ns: u64, client: ClientIndex, bad: BadSessionFrame, host: &mut impl ServerHost) {

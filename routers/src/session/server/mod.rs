@@ -27,11 +27,11 @@ use super::ClientIndex;
 use super::counts::SessionCounts;
 use super::frame::{RegistrationVerdict, SessionRefusalReason};
 use super::table::RoutingTable;
-use super::{ErrorReplies, LOOK_EVERY_NS, ReplicaEnd};
+use super::{EndHost, LOOK_EVERY_NS};
 use member::{Member, RoundTrip};
 use places::Places;
 use principal::Principal;
-use rohrpost_mailbox::TimeRecord;
+use rohrpost_mailbox::{Name, TimeRecord};
 use std::collections::VecDeque;
 use work::Registering;
 
@@ -60,28 +60,32 @@ pub struct ServerSettings {
 }
 
 /// A connection, for people.
-#[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
-    /// Its place.
-    pub index: ClientIndex,
-    /// Its name; until its hello, where it comes from.
-    pub name: &'a str,
-    /// First byte of the names that it may host; 0 until its hello.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MemberSnapshot {
+    /// Its name; before its hello, where it comes from.
+    pub name: String,
+    /// Where it comes from; empty if only its socket's owner knows.
+    pub peer: String,
+    /// First byte of the names that it may host; 0 before its hello.
     pub system: u8,
     /// Whether it takes part.
     pub is_member: bool,
     /// Ranges of names that it hosts.
-    pub ranges: usize,
-    /// When the connection was made, ns.
-    pub began_ns: u64,
-    /// When something came last, ns.
+    pub ranges: u64,
+    /// The first of them, each from the first to the last name in it.
+    pub hosts: Vec<(Name, Name)>,
+    /// Time since its connection was made, ns.
+    pub age_ns: u64,
+    /// Time since something came from it, ns.
     pub heard_ns: u64,
-    /// Packages of it, or of others that connect as the same principal, that were lost since it had more in a queue
-    /// than its share.
+    /// Packages lost in queues since it, or another connection of its principal, sent more than its share.
     pub lost: u64,
-    /// Bytes of memory that it takes up; what all share is not counted.
-    pub bytes: usize,
+    /// Bytes of memory that it takes up, with what waits for it; what all share is not counted.
+    pub bytes: u64,
 }
+
+/// Ranges of a client that are told by name.
+const HOSTS_MAX: usize = 64;
 
 /// Next step for the code around the core, from [`Server::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -135,7 +139,7 @@ pub enum ServerEvent<'a> {
 }
 
 /// What the server needs from the code that runs it.
-pub trait ServerHost: ErrorReplies + ReplicaEnd {
+pub trait ServerHost: EndHost {
     /// Something happened.
     fn event(&mut self, event: ServerEvent<'_>);
 }
@@ -214,17 +218,22 @@ impl Server {
     }
 
     /// All connections.
-    pub fn views(&self) -> impl Iterator<Item = View<'_>> {
-        self.present().map(|(index, member)| View {
-            index,
-            name: &member.name,
-            system: member.system,
-            is_member: member.is_member(),
-            ranges: member.registrations.ranges,
-            began_ns: member.began_ns,
-            heard_ns: member.heard_ns,
-            lost: self.places.principals.uses(member.principal_id).map_or(0, |uses| uses.lost),
-            bytes: member.bytes(),
+    pub fn snapshots(&self, now_ns: u64) -> impl Iterator<Item = (ClientIndex, MemberSnapshot)> {
+        self.present().map(move |(index, member)| {
+            let hosts = self.table.ranges_of(index).iter().take(HOSTS_MAX);
+            let snapshot = MemberSnapshot {
+                name: member.name.clone(),
+                peer: String::new(),
+                system: member.system,
+                is_member: member.is_member(),
+                ranges: member.registrations.ranges as u64,
+                hosts: hosts.map(|range| (range.first, range.last)).collect(),
+                age_ns: now_ns.saturating_sub(member.began_ns),
+                heard_ns: now_ns.saturating_sub(member.heard_ns),
+                lost: self.places.principals.uses(member.principal_id).map_or(0, |uses| uses.lost),
+                bytes: member.bytes() as u64,
+            };
+            (index, snapshot)
         })
     }
 

@@ -21,8 +21,7 @@ fn guarded() -> Ground {
 
 /// What becomes of a package that the server brings: with which priority it is delivered, or why it is lost.
 fn brought(ground: &mut Ground, head: Head) -> Result<u8, Cause> {
-    let mut bytes = Vec::new();
-    SessionMessage::Package(Carried { hops: 1, published_ns: ground.now_ns, head, body: &[] }).write(&mut bytes);
+    let bytes = SessionMessage::Package(Carried { hops: 1, published_ns: ground.now_ns, head, body: &[] }).to_bytes();
     let (client, _, notes) = &mut ground.ends[0];
     let before = notes.delivered.len();
     client.received(ground.now_ns, &bytes, notes);
@@ -73,10 +72,8 @@ fn a_refused_command_names_its_rule() {
 fn crossed(kind: Type, to: Name, from: Name) -> u8 {
     let mut ground = Ground::clients(2);
     let head = Head { to, from, kind, priority: Priority(255), ..Head::default() };
-    let package = crate::session::client::ClientPackage { head, body: &[], published_ns: ground.now_ns, hops: 0 };
-    let (client, _, notes) = &mut ground.ends[0];
-    client.send(ground.now_ns, &package, notes);
-    assert_eq!(client.out().class(Priority(255)).packages.get(), 0, "it is counted as what it is");
+    ground.sends(0, head, 0);
+    assert_eq!(ground.ends[0].0.out().class(Priority(255)).packages.get(), 0, "it is counted as what it is");
     ground.settle();
     assert_eq!(ground.server.counts().class(Priority(255)).packages.get(), 0, "at the server too");
     ground.ends[1].2.delivered[0].0.priority.0

@@ -1,13 +1,11 @@
 //! Both ends by hand: what a table shows better than chance.
 
-use super::ground::Ground;
-use super::plan::{COMMON, QUOTA, address, client_settings, module, ranges};
+use super::ground::{Ground, frames, package};
+use super::plan::{QUOTA, address, client_settings, module, ranges};
 use super::world::{MS, S};
 use crate::report::NotDelivered;
-use crate::session::client::{self, ClientPackage};
-use crate::session::frame::{
-    Carried, HEAD_BYTES, HOPS_MAX, LENGTH_MAX, Ranges, SessionFrameHead, SessionHello, SessionMessage,
-};
+use crate::session::client::{self, Client};
+use crate::session::frame::{HOPS_MAX, Ranges, SessionMessage};
 use crate::session::server::{self, MemberState};
 use crate::session::{Cause, HANDSHAKE_MAX_NS, SILENT_AFTER_NS};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, Type};
@@ -40,8 +38,7 @@ fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
     // When its holder has gone, the names are free.
     let place = ground.ends[0].1.take().unwrap();
     ground.server.closed(ground.now_ns, place, &mut ground.said);
-    ground.now_ns += S;
-    ground.settle();
+    ground.pass(S);
     assert!(ground.ends[1].0.is_up(), "{:?}", ground.ends[1].2.events);
 }
 
@@ -104,8 +101,7 @@ fn a_silent_end_is_gone() {
     let mut ground = Ground::clients(2);
     ground.ends[1].1 = None;
     for _ in 0..SILENT_AFTER_NS / (100 * MS) + 5 {
-        ground.now_ns += 100 * MS;
-        ground.settle();
+        ground.pass(100 * MS);
     }
     let names: Vec<_> = ground.server.clients().map(|(_, name, _)| name.to_owned()).collect();
     assert!(!names.contains(&"client 1".to_owned()) || ground.ends[1].1.is_some(), "{names:?}");
@@ -154,8 +150,8 @@ fn what_the_streams_held_for_too_long_is_not_delivered() {
     let mut ground = Ground::clients(2);
     let head =
         Head { to: module(1), from: module(0).with_local(1), len: 8, kind: Type::command(16), ..Head::default() };
-    let (client, place, notes) = &mut ground.ends[0];
-    client.send(ground.now_ns, &ClientPackage { head, body: &[0; 8], published_ns: ground.now_ns, hops: 0 }, notes);
+    ground.sends(0, head, 0);
+    let (client, place, _) = &mut ground.ends[0];
     let bytes = client.ready().to_vec();
     client.took(ground.now_ns, bytes.len());
     // The stream holds it for a second, to the server and once more from there.
@@ -180,10 +176,7 @@ fn what_the_streams_held_for_too_long_is_not_delivered() {
 fn frames_that_come_byte_by_byte_are_whole() {
     let mut ground = Ground::clients(2);
     let head = Head { to: module(1), from: module(0), len: 3, ..Head::default() };
-    let mut bytes = Vec::new();
-    for _ in 0..3 {
-        SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[1, 2, 3] }).write(&mut bytes);
-    }
+    let bytes = package(head, &[1, 2, 3]).to_bytes().repeat(3);
     let place = ground.ends[0].1.unwrap();
     bytes.iter().for_each(|byte| ground.server.received(ground.now_ns, place, &[*byte], &mut ground.said));
     ground.settle();
@@ -205,10 +198,8 @@ fn what_a_stranger_says_takes_no_memory_and_is_told_to_him() {
         let server::ServerStep::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) else {
             panic!("{words}")
         };
-        let (head, rest) = ground.server.ready(index).split_first_chunk::<HEAD_BYTES>().unwrap();
-        let head = SessionFrameHead::parse(head, LENGTH_MAX).unwrap();
-        let told = SessionMessage::parse(head, rest);
-        assert!(matches!(told, Ok(SessionMessage::Refusal(refusal)) if refusal.text.contains(words)));
+        let told = frames(ground.server.ready(index)).next();
+        assert!(matches!(told, Some((_, SessionMessage::Refusal(refusal))) if refusal.text.contains(words)));
         let bytes = ground.server.ready(index).len();
         ground.server.took(ground.now_ns, index, bytes);
         assert_eq!(ground.server.poll(ground.now_ns, &mut ground.said), server::ServerStep::Close(place));
@@ -230,7 +221,6 @@ fn an_idle_client_takes_up_little() {
 #[test]
 fn what_waits_is_bounded_and_the_least_important_gives_way() {
     let mut ground = Ground::clients(2);
-    let from = ground.ends[0].1.unwrap();
     let reader = ground.ends[1].1.unwrap();
     // The reader's stream takes nothing any more.
     let send = |ground: &mut Ground, priority: u8, count: usize| {
@@ -238,9 +228,7 @@ fn what_waits_is_bounded_and_the_least_important_gives_way() {
             let priority = Priority(priority);
             let head =
                 Head { to: module(1), from: module(0), len: 1000, kind: Type::data(1), priority, ..Head::default() };
-            let mut bytes = Vec::new();
-            SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] }).write(&mut bytes);
-            ground.server.received(ground.now_ns, from, &bytes, &mut ground.said);
+            ground.receives(0, &package(head, &[0; 1000]));
             while let server::ServerStep::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) {
                 let taken = if index == reader { 0 } else { ground.server.ready(index).len() };
                 ground.server.took(ground.now_ns, index, taken);
@@ -259,13 +247,9 @@ fn what_waits_is_bounded_and_the_least_important_gives_way() {
 #[test]
 fn names_of_others_are_sent_by_nobody() {
     let mut ground = Ground::clients(2);
-    let mut bytes = Vec::new();
     for from in [module(1), Name::NONE] {
-        let head = Head { to: module(1), from, ..Head::default() };
-        SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
+        ground.receives(0, &package(Head { to: module(1), from, ..Head::default() }, &[]));
     }
-    let place = ground.ends[0].1.unwrap();
-    ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
     ground.settle();
     assert_eq!(ground.delivered(1), []);
     assert_eq!(ground.server.counts().lost_for(Cause::Foreign), 2);
@@ -276,21 +260,10 @@ fn a_later_connection_of_the_same_incarnation_takes_the_place_of_the_earlier() {
     let mut ground = Ground::clients(2);
     let old = ground.ends[0].1.unwrap();
     let place = ground.server.accept(ground.now_ns, address(0, 2), &mut ground.said).unwrap();
-    let hello = SessionHello {
-        system: 1,
-        reaches_own: true,
-        common: COMMON,
-        system_digest: 11,
-        incarnation: 100,
-        attempt: 2,
-        asked_ns: 1,
-        name: "client 0",
-    };
-    let mut bytes = Vec::new();
-    SessionMessage::Hello(hello).write(&mut bytes);
-    let mut laid_out = Vec::new();
-    SessionMessage::Register(Ranges::new(1, &ranges(0), &mut laid_out)).write(&mut bytes);
-    ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
+    let mut later = Client::new(client_settings(0, 100), Vec::new(), ground.now_ns);
+    (0..2).for_each(|_| later.connected(ground.now_ns));
+    let register = SessionMessage::Register(Ranges::new(1, &ranges(0), &mut Vec::new())).to_bytes();
+    ground.server.received(ground.now_ns, place, &[later.ready(), &register].concat(), &mut ground.said);
     assert_eq!(ground.server.table().client_of(module(0)), Some(place));
     let state = ground.server.clients().find(|(index, _, _)| *index == old).map(|(_, _, state)| state);
     assert!(matches!(state, Some(MemberState::Leaving { .. })), "{state:?}");

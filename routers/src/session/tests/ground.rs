@@ -2,13 +2,13 @@
 
 use super::plan::{address, client_settings, module, ranges, server_settings};
 use super::world::S;
-use super::world::rings::Rings;
+use super::world::rings::{Rings, SERVER};
 use crate::replication::LineReplicas;
 use crate::report::NotDelivered;
 use crate::session::client::{self, Client, ClientPackage};
-use crate::session::frame::{Carried, Range};
+use crate::session::frame::{Carried, LENGTH_MAX, Range, Ranges, SessionFrameHead, SessionMessage};
 use crate::session::server::{self, Server};
-use crate::session::{Cause, ClientIndex, ErrorReplies, ReplicaEnd};
+use crate::session::{Cause, ClientIndex, EndHost};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 
 /// Notes all that is told.
@@ -23,15 +23,13 @@ pub(super) struct Notes {
     pub(super) rings: Option<Rings>,
 }
 
-impl ErrorReplies for Notes {
+impl EndHost for Notes {
     fn answer(&mut self, _: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {
         self.lost.push(why);
         answer.extend(why.word().bytes());
         true
     }
-}
 
-impl ReplicaEnd for Notes {
     fn replicas(&mut self) -> Option<&mut LineReplicas> {
         self.rings.as_mut().map(|rings| &mut rings.line)
     }
@@ -75,36 +73,44 @@ impl Ground {
         Self::with_room((16, 4), clients)
     }
 
+    /// With places for so many clients, and for so many that have not said hello.
     pub(super) fn with_room(
-        (clients_max, greetings_max): (u16, u16),
+        (clients_max, handshakes_max): (u16, u16),
         clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
     ) -> Self {
-        Self::with(server::ServerSettings { clients_max, handshakes_max: greetings_max, ..server_settings(5) }, clients)
+        Self::with(server::ServerSettings { clients_max, handshakes_max, ..server_settings(5) }, clients)
     }
 
     pub(super) fn with(
         settings: server::ServerSettings,
         clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
     ) -> Self {
-        Self::with_said(settings, clients, Notes::default())
-    }
-
-    /// A server that tells these.
-    pub(super) fn with_said(
-        settings: server::ServerSettings,
-        clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
-        said: Notes,
-    ) -> Self {
-        let now_ns = 100 * S;
-        let server = Server::new(settings);
-        let end = |(settings, ranges)| (Client::new(settings, ranges, now_ns), None, Notes::default());
-        let mut ground = Self { now_ns, server, said, ends: clients.into_iter().map(end).collect() };
+        let mut ground = Self::before(settings, clients);
         ground.settle();
         ground
     }
 
+    /// Before anything is said.
+    fn before(
+        settings: server::ServerSettings,
+        clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
+    ) -> Self {
+        let now_ns = 100 * S;
+        let end = |(settings, ranges)| (Client::new(settings, ranges, now_ns), None, Notes::default());
+        let ends = clients.into_iter().map(end).collect();
+        Self { now_ns, server: Server::new(settings), said: Notes::default(), ends }
+    }
+
     pub(super) fn clients(count: usize) -> Self {
-        Self::new((0..count).map(|client| (client_settings(client, 100 + client as u64), ranges(client))))
+        Self::new(of_clients(count))
+    }
+
+    /// With streams of the server's node and of the first client's, which all have.
+    pub(super) fn replicated(count: usize) -> Self {
+        let mut ground = Self::before(server_settings(5), of_clients(count));
+        ground.said.rings = Some(Rings::new(SERVER, count));
+        ground.settle();
+        ground
     }
 
     /// Until nobody has anything to do.
@@ -158,22 +164,57 @@ impl Ground {
         }
     }
 
-    pub(super) fn send(&mut self, from: usize, to: Name, hops: u8) {
-        let head = Head {
-            to,
-            from: module(from).with_local(1),
-            len: 8,
-            kind: Type::command(16),
-            priority: Priority(60),
-            ..Head::default()
-        };
-        let package = ClientPackage { head, body: &[0; 8], published_ns: self.now_ns, hops };
+    /// What a client says comes to the server, besides what it has to say.
+    pub(super) fn receives(&mut self, from: usize, message: &SessionMessage<'_>) {
+        let place = self.ends[from].1.unwrap();
+        self.server.received(self.now_ns, place, &message.to_bytes(), &mut self.said);
+    }
+
+    /// A registration of a client comes to the server.
+    pub(super) fn register(&mut self, client: usize, number: u32, ranges: &[Range]) {
+        self.receives(client, &SessionMessage::Register(Ranges::new(number, ranges, &mut Vec::new())));
+    }
+
+    /// A client is to send a package that has just been published.
+    pub(super) fn sends(&mut self, from: usize, head: Head, hops: u8) {
+        let body = vec![0; head.len.into()];
         let (client, _, notes) = &mut self.ends[from];
-        client.send(self.now_ns, &package, notes);
+        client.send(self.now_ns, &ClientPackage { head, body: &body, published_ns: self.now_ns, hops }, notes);
+    }
+
+    pub(super) fn send(&mut self, from: usize, to: Name, hops: u8) {
+        let (from_name, kind, priority) = (module(from).with_local(1), Type::command(16), Priority(60));
+        self.sends(from, Head { to, from: from_name, len: 8, kind, priority, ..Head::default() }, hops);
+        self.settle();
+    }
+
+    /// Time passes, and all that is due then happens.
+    pub(super) fn pass(&mut self, for_ns: u64) {
+        self.now_ns += for_ns;
         self.settle();
     }
 
     pub(super) fn delivered(&self, client: usize) -> Vec<Name> {
         self.ends[client].2.delivered.iter().filter(|(head, _)| head.kind.0 > 0).map(|(head, _)| head.to).collect()
     }
+}
+
+fn of_clients(count: usize) -> impl Iterator<Item = (client::ClientSettings, Vec<Range>)> {
+    (0..count).map(|client| (client_settings(client, 100 + client as u64), ranges(client)))
+}
+
+/// A package as a client sends it that does not know when it was published.
+pub(super) const fn package(head: Head, body: &[u8]) -> SessionMessage<'_> {
+    SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body })
+}
+
+/// The whole frames that bytes begin with.
+pub(super) fn frames(mut bytes: &[u8]) -> impl Iterator<Item = (SessionFrameHead, SessionMessage<'_>)> {
+    std::iter::from_fn(move || {
+        let (head, rest) = bytes.split_first_chunk()?;
+        let head = SessionFrameHead::parse(head, LENGTH_MAX).unwrap();
+        let (frame, behind) = rest.split_at_checked(head.length)?;
+        bytes = behind;
+        Some((head, SessionMessage::parse(head, frame).unwrap()))
+    })
 }

@@ -1,10 +1,11 @@
 //! Data of which only the newest counts, on their way through a connection that takes nothing for a while.
 
+use super::ground::frames;
 use super::plan::{QUOTA, module};
 use super::world::{MS, S};
 use crate::queue::QueueShare;
 use crate::session::counts::Cause;
-use crate::session::frame::{HEAD_BYTES, LENGTH_MAX, SessionFrameHead, SessionMessage};
+use crate::session::frame::SessionMessage;
 use crate::session::outgoing::{Fates, Outgoing, Parcel};
 use rohrpost_mailbox::{Head, Options, Priority, Type};
 
@@ -48,14 +49,8 @@ impl Stalled {
     fn send(&mut self, head: Head, value: u8, len: usize) {
         let head = Head { to: module(0), priority: Priority(60), len: len as u16, ..head };
         let body = vec![value; len];
-        let parcel = Parcel {
-            head: &head,
-            body: &body,
-            published_ns: self.now_ns,
-            hops: 0,
-            level: 8,
-            share: QueueShare::default(),
-        };
+        let (published_ns, share) = (self.now_ns, QueueShare::default());
+        let parcel = Parcel { head: &head, body: &body, published_ns, hops: 0, level: 8, share };
         self.outgoing.accept(None, &parcel, &mut self.log);
     }
 
@@ -66,16 +61,10 @@ impl Stalled {
             self.outgoing.refill(self.now_ns, 0, &mut self.log);
             let bytes = self.outgoing.ready().to_vec();
             self.outgoing.took(bytes.len());
-            let mut rest = &bytes[..];
-            while let Some(head) = rest.first_chunk::<HEAD_BYTES>() {
-                let head = SessionFrameHead::parse(head, LENGTH_MAX).unwrap();
-                let (frame, behind) = rest[HEAD_BYTES..].split_at(head.length);
-                let Ok(SessionMessage::Package(carried)) = SessionMessage::parse(head, frame) else {
-                    panic!("no package")
-                };
+            for (_, message) in frames(&bytes) {
+                let SessionMessage::Package(carried) = message else { panic!("no package") };
                 assert!(carried.body.iter().all(|byte| *byte == carried.body[0]), "the body is its own");
                 left.push((carried.head.id, carried.body[0]));
-                rest = behind;
             }
         }
         left

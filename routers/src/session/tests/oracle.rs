@@ -4,7 +4,7 @@ use super::plan::ROUTER;
 use crate::replication::LineReplicas;
 use crate::report::NotDelivered;
 use crate::session::frame::{Carried, Range};
-use crate::session::{AGE_MAX_NS, Cause, ErrorReplies, ReplicaEnd, client, server};
+use crate::session::{AGE_MAX_NS, Cause, EndHost, client, server};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options, local};
 use rohrpost_testbed::sim::chance::Chance;
 use std::collections::BTreeMap;
@@ -29,9 +29,6 @@ pub(super) struct Known {
     pub(super) system: u8,
     pub(super) ranges: Vec<Range>,
     pub(super) reaches_own: bool,
-    pub(super) up_ns: Option<u64>,
-    /// Another client with a narrower range that must get what lies in it when it is up.
-    pub(super) refusals: Vec<String>,
 }
 
 /// Packages that stay in their order: of one sender, receiver and priority; of data of which only the newest counts, of
@@ -129,7 +126,7 @@ pub(super) struct Teller<'a> {
     pub(super) line: Option<&'a mut LineReplicas>,
 }
 
-impl ErrorReplies for Teller<'_> {
+impl EndHost for Teller<'_> {
     fn answer(&mut self, call: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {
         let Some(number) = number_of(call) else { return false };
         self.oracle.saw(why.word());
@@ -151,9 +148,7 @@ impl ErrorReplies for Teller<'_> {
         answer.extend((number as u64).to_le_bytes());
         true
     }
-}
 
-impl ReplicaEnd for Teller<'_> {
     fn replicas(&mut self) -> Option<&mut LineReplicas> {
         self.line.as_deref_mut()
     }
@@ -179,13 +174,8 @@ impl client::ClientHost for Teller<'_> {
     }
 
     fn event(&mut self, event: client::ClientEvent<'_>) {
-        let known = &mut self.oracle.clients[self.client];
-        match event {
-            client::ClientEvent::Up => known.up_ns = Some(self.oracle.now_ns),
-            client::ClientEvent::Down => known.up_ns = None,
-            client::ClientEvent::Refused(refusal) => known.refusals.push(refusal.to_string()),
-            client::ClientEvent::Objected(verdict) => known.refusals.push(verdict.to_string()),
-            client::ClientEvent::Damaged(bad) => self.oracle.broken(format!("client {} read: {bad}", self.client)),
+        if let client::ClientEvent::Damaged(bad) = event {
+            self.oracle.broken(format!("client {} read: {bad}", self.client));
         }
         self.oracle.saw(match event {
             client::ClientEvent::Up => "up",

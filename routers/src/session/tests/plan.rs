@@ -18,6 +18,7 @@ pub(super) fn clock(chance: &mut Chance) -> Clock {
     Clock::new(monotonic_ns, monotonic_ns, chance.around(100_000))
 }
 
+#[derive(Default)]
 pub(super) struct Plan {
     pub(super) seed: u64,
     pub(super) clients: usize,
@@ -45,18 +46,7 @@ impl Plan {
         let clients = chance.between(3, 7) as usize;
         let lines = (0..clients).map(|_| chance.scale(20, 100_000)).collect();
         let per_s = chance.scale(100, 3000);
-        Self {
-            seed,
-            clients,
-            calm: false,
-            stalled: None,
-            lines,
-            held_bytes: None,
-            per_s,
-            flooder: None,
-            has_replicas: false,
-            holds_little: false,
-        }
+        Self { seed, clients, lines, per_s, ..Self::default() }
     }
 
     pub(super) fn calm(seed: u64) -> Self {

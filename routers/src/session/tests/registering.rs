@@ -1,10 +1,11 @@
 //! What it costs the server when all clients come at once, as after its restart.
 
 use super::ground::Notes;
-use super::plan::{COMMON, server_settings};
+use super::plan::{client_settings, server_settings};
 use super::world::MS;
 use crate::session::ClientIndex;
-use crate::session::frame::{Range, Ranges, SessionHello, SessionMessage};
+use crate::session::client::{Client, ClientSettings};
+use crate::session::frame::{Range, Ranges, SessionMessage};
 use crate::session::server::{Server, ServerSettings, ServerStep};
 use nix::time::{ClockId, clock_gettime};
 use rohrpost_mailbox::Name;
@@ -23,27 +24,18 @@ fn says(client: usize) -> Vec<u8> {
         Name::new(2 + (client >> 11) as u8, (client >> 3) as u8, ((client & 7) * RANGES + index) as u8, 0)
     };
     let ranges: Vec<Range> = (0..RANGES).map(|index| Range::module(module(index))).collect();
-    let (mut bytes, mut laid_out) = (Vec::new(), Vec::new());
-    let (system, incarnation, name) = (module(0).system(), 1 + client as u64, "a client");
-    let hello = SessionHello {
-        system,
-        reaches_own: true,
-        common: COMMON,
-        system_digest: 1,
-        incarnation,
-        attempt: 1,
-        asked_ns: 1,
-        name,
-    };
-    SessionMessage::Hello(hello).write(&mut bytes);
-    SessionMessage::Register(Ranges::new(1, &ranges, &mut laid_out)).write(&mut bytes);
-    bytes
+    let (system, incarnation) = (module(0).system(), 1 + client as u64);
+    let settings = ClientSettings { system, system_digest: 1, ..client_settings(0, incarnation) };
+    let mut says = Client::new(settings, Vec::new(), 0);
+    says.connected(1);
+    let register = SessionMessage::Register(Ranges::new(1, &ranges, &mut Vec::new())).to_bytes();
+    [says.ready(), &register].concat()
 }
 
 /// What the server's thread works until so many clients, each with its own address, are connected and host their names.
 fn coming_at_once(clients: usize) -> Duration {
-    let (clients_max, greetings_max) = (clients as u16, clients as u16);
-    let mut server = Server::new(ServerSettings { clients_max, handshakes_max: greetings_max, ..server_settings(5) });
+    let (clients_max, handshakes_max) = (clients as u16, clients as u16);
+    let mut server = Server::new(ServerSettings { clients_max, handshakes_max, ..server_settings(5) });
     let (mut host, mut now_ns, mut work) = (Notes::default(), 100_000 * MS, Duration::ZERO);
     for client in 0..clients {
         let ([high, low], bytes) = ((client as u16).to_be_bytes(), says(client));

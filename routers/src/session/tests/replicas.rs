@@ -3,11 +3,11 @@
 mod hostile;
 mod turns;
 
-use super::ground::{Ground, Notes};
-use super::plan::{Plan, client_settings, ranges, server_settings};
-use super::world::rings::{PICTURE, POSE, Rings, SERVER};
+use super::ground::Ground;
+use super::plan::Plan;
+use super::world::rings::{PICTURE, POSE};
 use super::world::{MS, S, World};
-use super::{WELL_NS, seeds};
+use super::{WELL_NS, all_seeds};
 use crate::replication::{LINE_PART_BYTES, LINE_PART_ROOM};
 use crate::session::ClientIndex;
 use crate::session::server::ServerStep;
@@ -43,16 +43,7 @@ fn run(plan: Plan) -> World {
 
 #[test]
 fn records_are_whole_or_told_and_the_newest_is_next_whatever_goes_wrong() {
-    let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
-    for seed in 0..seeds() {
-        let world = run(Plan::replicated(seed));
-        assert_eq!(world.oracle.problems, [""; 0]);
-        world.oracle.seen.iter().for_each(|(what, count)| *seen.entry(what).or_default() += count);
-    }
-    eprintln!("{} networks: {seen:#?}", seeds());
-    for (what, least) in SEEN_IN_TEN {
-        assert!(seen.get(what).copied() >= Some(least * seeds() / 10), "too few of `{what}` to prove much: {seen:#?}");
-    }
+    all_seeds(run, Plan::replicated, &SEEN_IN_TEN);
 }
 
 /// Bytes a ms of each line: a fourth of the pictures, and all poses.
@@ -100,9 +91,7 @@ fn a_package_waits_for_one_part_at_most_and_what_the_kernel_has() {
 /// Else the line would be measured while nothing is to be sent, and be taken for slow.
 #[test]
 fn behind_the_last_part_nothing_waits() {
-    let clients = [0, 1].map(|client| (client_settings(client, 100 + client as u64), ranges(client)));
-    let said = Notes { rings: Some(Rings::new(SERVER, 2)), ..Notes::default() };
-    let mut ground = Ground::with_said(server_settings(5), clients, said);
+    let mut ground = Ground::replicated(2);
     let mut waited: BTreeMap<ClientIndex, Vec<bool>> = BTreeMap::new();
     for ms in [100, 200, 300] {
         assert!(ground.said.rings.as_mut().unwrap().write(ms));

@@ -1,25 +1,23 @@
 //! What one principal may have of what all share, by hand: connections, ranges, memory and the line of a queue; and
 //! names that it never gets.
 
-use super::ground::Ground;
+use super::ground::{Ground, package};
 use super::plan::{QUOTA, address, classes, client_settings, loud, module, ranges, server_settings, system_of};
-use super::strain::{many, own, register};
+use super::strain::{many, own};
 use super::world::{MS, S};
-use crate::session::client::ClientSettings;
-use crate::session::frame::{Carried, RANGES_MAX, Range, SessionMessage};
+use crate::session::client::{Client, ClientSettings, ClientStep};
+use crate::session::frame::{RANGES_MAX, Range};
 use crate::session::server::{self, MemberState, OwnNode, OwnNodes, Rights, ServerSettings};
 use crate::session::{Cause, ClientIndex, ENTRIES_MAX};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 
 /// A package of a client comes to the server.
 fn send(ground: &mut Ground, from: usize, to: usize, priority: u8, kind: Type, len: usize) {
-    let place = ground.ends[from].1.unwrap();
     // Nothing hurries more than its sender.
-    let (to, from) = (module(to), if priority > 200 { loud(from) } else { module(from).with_local(1) });
-    let head = Head { to, from, len: len as u16, kind, priority: Priority(priority), ..Head::default() };
-    let mut bytes = Vec::new();
-    SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &vec![0; len] }).write(&mut bytes);
-    ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
+    let sender = if priority > 200 { loud(from) } else { module(from).with_local(1) };
+    let priority = Priority(priority);
+    let head = Head { to: module(to), from: sender, len: len as u16, kind, priority, ..Head::default() };
+    ground.receives(from, &package(head, &vec![0; len]));
 }
 
 /// What the stream of one client takes, so many bytes; those of others take all.
@@ -66,7 +64,7 @@ fn a_flood_of_a_queue_displaces_no_sender_with_less_in_it() {
     assert!(lost(&ground, 250, Cause::Share) > 5, "the flood gives way to them: {}", lost(&ground, 250, Cause::Share));
     let lost_of = |end: usize| {
         let place = ground.ends[end].1.unwrap();
-        ground.server.views().find(|view| view.index == place).unwrap().lost
+        ground.server.snapshots(0).find(|(index, _)| *index == place).unwrap().1.lost
     };
     let all = ground.server.counts().lost_for(Cause::Full) + ground.server.counts().lost_for(Cause::Share);
     assert_eq!((lost_of(0), lost_of(1)), (all, 0), "counted for its sender");
@@ -126,7 +124,7 @@ fn one_certificate_does_not_fill_the_table_however_often_it_connects() {
     ground.now_ns += S;
     for (client, place, notes) in ground.ends[..clients - 1].iter_mut() {
         client.closed(ground.now_ns - S, notes);
-        assert_eq!(client.poll(ground.now_ns, notes), crate::session::client::ClientStep::Connect);
+        assert_eq!(client.poll(ground.now_ns, notes), ClientStep::Connect);
         let index = ground.server.accept(ground.now_ns, address(9, 0), &mut ground.said).unwrap();
         ground.server.certify(index, 1, "node hostile of system 1", Rights::any());
         client.connected(ground.now_ns);
@@ -135,13 +133,11 @@ fn one_certificate_does_not_fill_the_table_however_often_it_connects() {
     ground.settle();
     let names = |client: usize| many(0, 0).into_iter().map(move |range| own(3 * client, range)).collect::<Vec<Range>>();
     for number in 1..30 {
-        (0..clients - 1).for_each(|client| register(&mut ground, client, 100 + number, &names(client)));
-        ground.now_ns += 100 * MS;
-        ground.settle();
+        (0..clients - 1).for_each(|client| ground.register(client, 100 + number, &names(client)));
+        ground.pass(100 * MS);
     }
-    register(&mut ground, clients - 1, 200, &names(clients - 1));
-    ground.now_ns += 100 * MS;
-    ground.settle();
+    ground.register(clients - 1, 200, &names(clients - 1));
+    ground.pass(100 * MS);
     let hosts = |client: usize| ground.server.table().count_of(ground.ends[client].1.unwrap());
     let of_one: usize = (0..clients - 1).map(hosts).sum();
     assert!(of_one <= ENTRIES_MAX / 8 && of_one > ENTRIES_MAX / 8 - RANGES_MAX, "{of_one} ranges of one certificate");
@@ -151,12 +147,7 @@ fn one_certificate_does_not_fill_the_table_however_often_it_connects() {
 
 /// A client that says hello from an address; its place, or none.
 fn joins(ground: &mut Ground, client: usize, from: usize) -> Option<ClientIndex> {
-    let mut end =
-        crate::session::client::Client::new(client_settings(client, 500 + client as u64), Vec::new(), ground.now_ns);
-    let place = ground.server.accept(ground.now_ns, address(from, client as u64), &mut ground.said)?;
-    end.connected(ground.now_ns);
-    let hello = end.ready().to_vec();
-    ground.server.received(ground.now_ns, place, &hello, &mut ground.said);
+    let place = says_hello(ground, (client_settings(client, 500 + client as u64), 1), (from, None))?;
     is_member(ground, place).then_some(place)
 }
 
@@ -198,20 +189,20 @@ fn one_address_does_not_push_others_out_before_their_hello() {
     assert!(ground.server.crowded().handshakes > 3);
 }
 
-/// A connection says hello as a client in this attempt, behind the certificate that it shows; its place.
+/// A connection says hello as a client in this attempt, behind the certificate that it shows; its place, or none.
 fn says_hello(
     ground: &mut Ground,
     (settings, attempt): (ClientSettings, u64),
     (from, certificate): (usize, Option<(u8, &str)>),
-) -> ClientIndex {
-    let mut end = crate::session::client::Client::new(settings, Vec::new(), ground.now_ns);
+) -> Option<ClientIndex> {
+    let mut end = Client::new(settings, Vec::new(), ground.now_ns);
     (0..attempt).for_each(|_| end.connected(ground.now_ns));
-    let place = ground.server.accept(ground.now_ns, address(from, attempt), &mut ground.said).unwrap();
+    let place = ground.server.accept(ground.now_ns, address(from, attempt), &mut ground.said)?;
     if let Some((system, name)) = certificate {
         ground.server.certify(place, system, name, Rights::any());
     }
     ground.server.received(ground.now_ns, place, end.ready(), &mut ground.said);
-    place
+    Some(place)
 }
 
 /// An incarnation is no secret: it stands in each hello.
@@ -231,12 +222,12 @@ fn nobody_takes_the_place_of_a_client_of_another_principal() {
         ((0, node), (0, None), own(), false, "without a certificate"),
     ] {
         let mut ground = Ground::with_room((16, 4), []);
-        let victim = says_hello(&mut ground, (own(), 1), first);
-        let later = says_hello(&mut ground, (settings, 2), then);
+        let victim = says_hello(&mut ground, (own(), 1), first).unwrap();
+        let later = says_hello(&mut ground, (settings, 2), then).unwrap();
         let are_members = (is_member(&ground, victim), is_member(&ground, later));
         assert_eq!(are_members, (!replaces, true), "{what}: {:?}", ground.said.events);
         // Nor does it keep the first one out, when that comes again.
-        let again = says_hello(&mut ground, (own(), 3), first);
+        let again = says_hello(&mut ground, (own(), 3), first).unwrap();
         assert!(is_member(&ground, again), "{what}: {:?}", ground.said.events);
     }
 }
@@ -299,8 +290,7 @@ fn what_the_file_gives_a_node_no_other_client_gets_where_nobody_shows_a_certific
         (client_settings(3, 7), ranges(3)),
     ];
     let mut ground = Ground::with(settings.clone(), ends);
-    ground.now_ns += S;
-    ground.settle();
+    ground.pass(S);
     assert_eq!(ground.server.table().client_of(module(3)), ground.ends[3].1, "{:?}", ground.said.events);
     let told = &ground.ends[0].2.events;
     assert!(

@@ -301,7 +301,7 @@ impl ClientThread {
         }
         if !all || waits {
             self.client.set_pace(connection.stream.is_slow(), connection.stream.batch_bytes());
-            connection.stream.set_round_trip(self.client.round_trip_ns());
+            connection.stream.set_round_trip(self.client.clock().round_trip_ns());
         }
         if !all {
             self.await_room(true);
@@ -350,8 +350,9 @@ impl ClientThread {
             if !time.is_steady() {
                 self.client.forget_time();
             }
-            time.told(now_ns, self.client.system_time(now_ns), self.client.answers());
-            self.shared.round_trip.set(self.client.round_trip_ns());
+            let clock = self.client.clock();
+            time.told(now_ns, clock.system(now_ns), clock.answers());
+            self.shared.round_trip.set(self.client.clock().round_trip_ns());
         }
         let client = &self.client;
         let state = match (client.is_up(), client.is_connected()) {
@@ -359,12 +360,12 @@ impl ClientThread {
             (false, true) => LinkState::Joining,
             (false, false) => LinkState::Away,
         };
-        let told = client.system_time(now_ns).map(|record| record.at(now_ns).error);
+        let told = client.clock().system(now_ns).map(|record| record.at(now_ns).error);
         self.shared.seen.say(ClientLink {
             state,
             why: self.reporter.why.clone(),
             connections: client.connections(),
-            round_trip_ns: client.round_trip_ns(),
+            round_trip_ns: client.clock().round_trip_ns(),
             time_error_ns: told.map(|error| u64::try_from(error.as_nanos()).unwrap_or(u64::MAX)),
             outage: self.reporter.outage,
             time: self.time.as_ref().map(|time| *time.record()),

@@ -4,7 +4,7 @@ use crate::replication::LineReplicas;
 use crate::report::NotDelivered;
 use crate::session::client::{ClientEvent, ClientHost};
 use crate::session::frame::Carried;
-use crate::session::{Cause, ErrorReplies, ReplicaEnd};
+use crate::session::{Cause, EndHost};
 use crate::shell::sender_cache::SenderCache;
 use crate::tcp::fault_writer::FaultWriter;
 use crate::tcp::snapshots::Outage;
@@ -50,15 +50,13 @@ impl EventReporter {
     }
 }
 
-impl ReplicaEnd for EventReporter {
-    fn replicas(&mut self) -> Option<&mut LineReplicas> {
-        self.line.as_mut()
-    }
-}
-
-impl ErrorReplies for EventReporter {
+impl EndHost for EventReporter {
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
         self.fault_writer.answer(call, why, holder, answer)
+    }
+
+    fn replicas(&mut self) -> Option<&mut LineReplicas> {
+        self.line.as_mut()
     }
 }
 

@@ -12,10 +12,10 @@ pub use parts::{ServerError, ServerParts};
 use super::fault_writer::FaultWriter;
 use super::replicas::LineCounts;
 use super::seal::{Holder, ServerSeal};
-use super::snapshots::{Class, HOSTS_MAX, LatestValue, MEMBERS_MAX, MemberSnapshot, Members, SAY_EVERY_NS};
+use super::snapshots::{Class, LatestValue, MEMBERS_MAX, Members, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
 use crate::replication::MeasuredRoundTrip;
-use crate::session::server::{Names, Rights, Server, ServerStep, View};
+use crate::session::server::{MemberSnapshot, Names, Rights, Server, ServerStep};
 use crate::session::{Cause, ClientIndex};
 use accept::{listen, raise_descriptors};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
@@ -320,35 +320,17 @@ impl ServerThread {
     }
 
     fn say(&self, now_ns: u64) {
-        let mut hosts = vec![Vec::new(); self.connections.len()];
-        for (client, range) in self.server.table().hosted() {
-            let hosts = hosts.get_mut(usize::from(client.0)).filter(|hosts| hosts.len() < HOSTS_MAX);
-            hosts.into_iter().for_each(|hosts| hosts.push((range.first, range.last)));
-        }
-        let member = |client: View<'_>| MemberSnapshot {
-            name: client.name.to_owned(),
-            peer: self
-                .connections
-                .get(usize::from(client.index.0))
-                .and_then(Option::as_ref)
-                .map_or_else(String::new, |c| c.peer.clone()),
-            system: client.system,
-            is_member: client.is_member,
-            ranges: client.ranges as u64,
-            hosts: hosts.get_mut(usize::from(client.index.0)).map(std::mem::take).unwrap_or_default(),
-            age_ns: now_ns.saturating_sub(client.began_ns),
-            heard_ns: now_ns.saturating_sub(client.heard_ns),
-            lost: client.lost,
-            bytes: client.bytes as u64,
+        let member = |(client, member): (ClientIndex, MemberSnapshot)| {
+            let connection = self.connections.get(usize::from(client.0)).and_then(Option::as_ref);
+            MemberSnapshot { peer: connection.map_or_else(String::new, |it| it.peer.clone()), ..member }
         };
+        let members: Vec<_> = self.server.snapshots(now_ns).take(MEMBERS_MAX).map(member).collect();
+        let more = (self.server.clients().count() - members.len()) as u64;
         let classes = Class::all(self.server.counts());
         let ServerReporter { left, refused, ref refusal, .. } = self.host;
         let (refusal, held) = (refusal.clone(), self.host.held());
         let (crowded, superseded) = (self.server.crowded(), self.server.superseded());
         let crowded_packages = self.server.counts().lost_for(Cause::Share);
-        let mut views = self.server.views();
-        let members = views.by_ref().take(MEMBERS_MAX).map(member).collect();
-        let more = views.count() as u64;
         self.shared.seen.say(Members {
             members,
             more,

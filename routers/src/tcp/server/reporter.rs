@@ -3,7 +3,7 @@
 use crate::replication::LineReplicas;
 use crate::session::frame::SessionRefusalReason;
 use crate::session::server::{ServerEvent, ServerHost};
-use crate::session::{Cause, ErrorReplies, ReplicaEnd};
+use crate::session::{Cause, EndHost};
 use crate::tcp::fault_writer::FaultWriter;
 use crate::tcp::line_throttle::{LineThrottle, Topic};
 use rohrpost_mailbox::monotonic_ns;
@@ -62,15 +62,13 @@ fn tell(topic: Topic, line: &str) {
     }
 }
 
-impl ReplicaEnd for ServerReporter {
-    fn replicas(&mut self) -> Option<&mut LineReplicas> {
-        self.line.as_mut()
-    }
-}
-
-impl ErrorReplies for ServerReporter {
+impl EndHost for ServerReporter {
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
         self.fault_writer.answer(call, why, holder, answer)
+    }
+
+    fn replicas(&mut self) -> Option<&mut LineReplicas> {
+        self.line.as_mut()
     }
 }
 

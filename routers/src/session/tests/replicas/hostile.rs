@@ -3,10 +3,9 @@
 use crate::frame::{DescriptionPart, RecordPart};
 use crate::replication::{LINE_PART_BYTES, ReplicaLoss};
 use crate::session::frame::SessionMessage;
-use crate::session::tests::ground::{Ground, Notes};
-use crate::session::tests::plan::{client_settings, ranges, server_settings};
+use crate::session::tests::ground::Ground;
 use crate::session::tests::world::S;
-use crate::session::tests::world::rings::{BACK, PICTURE, Rings, SERVER};
+use crate::session::tests::world::rings::{BACK, PICTURE};
 
 const WORDS: [u8; 100] = [3; 100];
 /// The client of the node on which the stream is written.
@@ -51,20 +50,10 @@ fn description() -> DescriptionPart<'static> {
     }
 }
 
-/// A server with the ring of a client's stream, and that client and another one.
-fn ground() -> Ground {
-    let clients = [WRITER, OTHER].map(|client| (client_settings(client, 100 + client as u64), ranges(client)));
-    let said = Notes { rings: Some(Rings::new(SERVER, 2)), ..Notes::default() };
-    Ground::with_said(server_settings(5), clients, said)
-}
-
 impl Ground {
     /// A client sends a frame besides what it has to say.
     fn takes(&mut self, from: usize, message: &SessionMessage<'_>) {
-        let mut bytes = Vec::new();
-        message.write(&mut bytes);
-        let place = self.ends[from].1.unwrap();
-        self.server.received(self.now_ns, place, &bytes, &mut self.said);
+        self.receives(from, message);
         self.settle();
     }
 
@@ -80,7 +69,7 @@ impl Ground {
 
 #[test]
 fn what_does_not_belong_there_is_counted_and_the_connection_goes_on() {
-    let mut ground = ground();
+    let mut ground = Ground::replicated(2);
     let bytes = [7; LEN];
     let (first, second) = bytes.split_at(LINE_PART_BYTES);
     let sound = part(first);
@@ -121,7 +110,7 @@ fn what_does_not_belong_there_is_counted_and_the_connection_goes_on() {
 
 #[test]
 fn a_frame_that_is_wrong_in_itself_ends_the_connection_that_it_came_by() {
-    let mut ground = ground();
+    let mut ground = Ground::replicated(2);
     ground.takes(WRITER, &SessionMessage::Description(description()));
     let bytes = [7; LINE_PART_BYTES];
     ground.takes(WRITER, &SessionMessage::Record(part(&bytes)));
@@ -132,12 +121,11 @@ fn a_frame_that_is_wrong_in_itself_ends_the_connection_that_it_came_by() {
 
 #[test]
 fn a_node_that_is_another_client_by_now_gets_nothing_any_more() {
-    let mut ground = ground();
+    let mut ground = Ground::replicated(2);
     ground.takes(WRITER, &SessionMessage::Description(description()));
     let (now_ns, (client, ..)) = (ground.now_ns, &mut ground.ends[WRITER]);
     client.host(now_ns, Vec::new());
-    ground.now_ns += crate::session::LOOK_EVERY_NS;
-    ground.settle();
+    ground.pass(crate::session::LOOK_EVERY_NS);
     let bytes = [7; LINE_PART_BYTES];
     ground.takes(WRITER, &SessionMessage::Record(part(&bytes)));
     assert_eq!(ground.lost(ReplicaLoss::Foreign), 1, "it is not that node without its name");
@@ -146,7 +134,7 @@ fn a_node_that_is_another_client_by_now_gets_nothing_any_more() {
 /// Each would make a ring, in the thread that all clients share.
 #[test]
 fn a_stream_that_is_made_anew_all_the_time_is_so_once_a_second() {
-    let mut ground = ground();
+    let mut ground = Ground::replicated(2);
     ground.takes(WRITER, &SessionMessage::Description(description()));
     let anew = |number: u16| RecordPart {
         generation: number,

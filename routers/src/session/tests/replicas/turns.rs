@@ -2,11 +2,11 @@
 
 use crate::harness::MS;
 use crate::session::ClientIndex;
-use crate::session::frame::{Carried, LENGTH_MAX, SessionFrameHead, SessionFrameKind, SessionMessage};
+use crate::session::frame::{LENGTH_MAX, SessionFrameHead, SessionFrameKind};
 use crate::session::server::ServerStep;
-use crate::session::tests::ground::{Ground, Notes};
-use crate::session::tests::plan::{client_settings, module, ranges, server_settings};
-use crate::session::tests::world::rings::{Rings, SERVER};
+use crate::session::tests::ground::{Ground, package};
+use crate::session::tests::plan::module;
+use crate::session::tests::world::rings::Rings;
 use rohrpost_mailbox::{Head, Priority, Type};
 
 /// What is read of a client at a time.
@@ -15,13 +15,6 @@ const PIECE_BYTES: usize = 64 * 1024;
 const BOTH_MS: u64 = 0;
 const POSES_MS: u64 = 10;
 
-/// A server that sends streams to three clients.
-fn ground() -> Ground {
-    let clients = [0, 1, 2].map(|client| (client_settings(client, 100 + client as u64), ranges(client)));
-    let said = Notes { rings: Some(Rings::new(SERVER, 3)), ..Notes::default() };
-    Ground::with_said(server_settings(5), clients, said)
-}
-
 impl Ground {
     fn rings(&mut self) -> &mut Rings {
         self.said.rings.as_mut().unwrap()
@@ -29,15 +22,12 @@ impl Ground {
 
     /// One piece of packages from a client to another comes at once.
     fn reads_piece(&mut self, (from, to): (usize, usize)) -> usize {
-        let (mut bytes, mut count) = (Vec::new(), 0);
-        while bytes.len() < PIECE_BYTES - 2000 {
-            let (to, from, kind) = (module(to), module(from).with_local(1), Type::data(1));
-            let head = Head { to, from, len: 1000, kind, priority: Priority(60), ..Head::default() };
-            SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] }).write(&mut bytes);
-            count += 1;
-        }
+        let (to, sender, kind) = (module(to), module(from).with_local(1), Type::data(1));
+        let head = Head { to, from: sender, len: 1000, kind, priority: Priority(60), ..Head::default() };
+        let one = package(head, &[0; 1000]).to_bytes();
+        let count = (PIECE_BYTES - 2000).div_ceil(one.len());
         let place = self.ends[from].1.unwrap();
-        self.server.received(self.now_ns, place, &bytes, &mut self.said);
+        self.server.received(self.now_ns, place, &one.repeat(count), &mut self.said);
         count
     }
 
@@ -57,7 +47,7 @@ impl Ground {
 
 #[test]
 fn what_comes_is_read_when_all_packages_that_wait_have_left_however_many_parts_do() {
-    let mut ground = ground();
+    let mut ground = Ground::replicated(3);
     let others = [0, 2].map(|client| ground.ends[client].1.unwrap());
     let (mut looks, mut packages) = (0, 0);
     while looks < 40 {
@@ -79,7 +69,7 @@ fn what_comes_is_read_when_all_packages_that_wait_have_left_however_many_parts_d
 /// What is written whenever there is more counts as the most that a line takes.
 #[test]
 fn poses_alone_are_no_more_than_they_are() {
-    let mut ground = ground();
+    let mut ground = Ground::replicated(3);
     ground.rings().write(POSES_MS);
     // The descriptions leave, and the first poses.
     while ground.writes().0 == ServerStep::Look {}
@@ -116,7 +106,7 @@ impl Ground {
 /// Poses are more important than these.
 #[test]
 fn while_less_important_packages_wait_parts_and_batches_of_them_have_turns() {
-    let mut ground = ground();
+    let mut ground = Ground::replicated(3);
     ground.rings().write(POSES_MS);
     while ground.writes().0 == ServerStep::Look {}
     ground.reads_piece((0, 1));

@@ -112,7 +112,6 @@ impl World {
         node.client = Client::new(client_settings(index, node.incarnation), ranges(index), now_ns);
         self.rings.iter_mut().for_each(|rings| rings.clients[index].restart());
         node.wake_ns = 0;
-        self.oracle.clients[index].up_ns = None;
         let is_told = self.faults.percent(50);
         for connection in self.connections.iter_mut().filter(|one| one.client == index) {
             connection.is_client_open = false;

@@ -68,8 +68,6 @@ impl World {
             system: system_of(index),
             ranges: ranges(index),
             reaches_own: client_settings(index, 1).reaches_own,
-            up_ns: None,
-            refusals: Vec::new(),
         };
         let mut oracle = SessionOracle::new((0..plan.clients).map(known).collect());
         oracle.flooder = plan.flooder;
@@ -129,11 +127,11 @@ impl World {
         self.server.set_time(Some(record));
         for (index, node) in self.nodes.iter().enumerate() {
             let now_ns = node.clock.at(self.now_ns).monotonic_ns;
-            let session = node.client.session(now_ns).filter(|_| node.client.is_up() && self.is_reached(index));
+            let session = node.client.clock().session(now_ns).filter(|_| node.client.is_up() && self.is_reached(index));
             if let Some(session) = session.filter(|session| session.ns.abs_diff(server_ns) > session.error_ns) {
                 self.oracle.problems.push(format!("client {index}: session clock {session:?}, in truth {server_ns}"));
             }
-            if let Some(time) = node.client.system_time(now_ns).map(|record| record.at(now_ns)) {
+            if let Some(time) = node.client.clock().system(now_ns).map(|record| record.at(now_ns)) {
                 let off_ns = time.ns.abs_diff(system_ns);
                 if u128::from(off_ns) > time.error.as_nanos() {
                     self.oracle.problems.push(format!("client {index}: system time {time:?} is {off_ns} ns off"));

@@ -70,9 +70,8 @@ pub(crate) const LINE: Group = Group {
                        records_are_whole_or_told_and_the_newest_is_next_whatever_goes_wrong",
             edits: &[edit(
                 "replication/gathering.rs",
-                "(self.parts, self.missing, self.expected) = (parts, parts, parts - 1);",
-                r"let missing = parts - usize::from(broken!(MissesLastPart) && parts > 1);
-        (self.parts, self.missing, self.expected) = (parts, missing, parts - 1);",
+                "(true, parts, parts - 1, now_ns);",
+                "(true, parts - usize::from(broken!(MissesLastPart) && parts > 1), parts - 1, now_ns);",
             )],
         },
         Planted {
