@@ -13,10 +13,10 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use rohrpost_mailbox::monotonic_ns;
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_routers::lab::Lab;
 use rohrpost_routers::shell::clock::{ClockParts, ClockService, ClockSnapshot, Skew};
 use rohrpost_routers::time::{Exchange, Role, TimeSettings};
-use rohrpost_testbed::report;
+use rohrpost_testbed::lan;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,19 +37,6 @@ fn asked(name: &str, otherwise: u64) -> u64 {
 
 fn address(node: u8) -> IpAddr {
     IpAddr::from([10, 77, 0, node + 1])
-}
-
-fn lab() -> Option<Lab> {
-    let specs: Vec<NodeSpec> =
-        (0..NODES).map(|node| NodeSpec { name: format!("n{node}"), address: address(node) }).collect();
-    match Lab::new(&specs, 1500) {
-        Ok(lab) => Some(lab),
-        Err(LabError::NotAllowed(error)) => {
-            report::skipped(&format!("network namespaces ({error})"));
-            None
-        }
-        Err(error) => panic!("{error}"),
-    }
 }
 
 struct Node {
@@ -77,16 +64,10 @@ impl Node {
             incarnation: monotonic_ns(),
         };
         let _inside = lab.enter(&format!("n{node}")).unwrap();
-        let service = ClockService::start(ClockParts {
-            settings,
-            nodes: (0..NODES).map(|node| SocketAddr::new(address(node), PORT)).collect(),
-            node: None,
-            impair: None,
-            kernel_stamps: true,
-            skew: Some(skew),
-            observer: Some(observer),
-        });
-        Self { service: service.unwrap(), skew, exchanges }
+        let addresses = (0..NODES).map(|node| SocketAddr::new(address(node), PORT)).collect();
+        let observer = Some(observer);
+        let parts = ClockParts { skew: Some(skew), observer, ..ClockParts::at(addresses, settings) };
+        Self { service: ClockService::start(parts).unwrap(), skew, exchanges }
     }
 
     fn snapshot(&self) -> ClockSnapshot {
@@ -195,7 +176,7 @@ fn memoryless(exchanges: &[Exchange], skew: &Skew, master: &ClockSnapshot, by_ke
 
 #[test]
 fn slaves_are_within_their_bounds() {
-    let Some(lab) = lab() else { return };
+    let Some(lab) = lan::lab(&lan::specs(&[0, 1, 2].map(address)), 1500) else { return };
     let interval = Duration::from_millis(asked("ROHRPOST_CLOCK_INTERVAL_MS", 100));
     let run = Duration::from_secs(asked("ROHRPOST_CLOCK_SECONDS", 2));
     let master = Node::start(&lab, 0, interval);

@@ -73,15 +73,12 @@ impl WindowLog {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::harness::tdma;
     use crate::tdma::{Carries, WindowKind, Wire};
-    use rohrpost_network::Tdma;
-    use std::time::Duration;
 
     #[test]
     fn a_window_that_was_over_when_its_last_call_came_back_is_counted() {
-        let (cycle, part) = (Duration::from_millis(10), Duration::from_millis(1));
-        let link_bytes_s = 125_000_000;
-        let tdma = Tdma { cycle, synchronisation: part, guard: part, link_bytes_s, slots: Vec::new(), tunnel: None };
+        let tdma = tdma([10_000, 1000, 1000], Vec::new());
         let wire = Wire::new(&tdma, 28);
         let window = Window { kind: WindowKind::Slot { index: 0 }, cycle: 0, begin_ns: 1_000_000, end_ns: 2_000_000 };
         let mut log = WindowLog::default();

@@ -2,6 +2,7 @@
 
 use super::{Stamp, Term};
 use crate::frame::{BadFrame, NodeIndex};
+use crate::settings::Settings;
 use rohrpost_mailbox::SystemTime;
 use std::time::Duration;
 
@@ -22,6 +23,14 @@ pub struct TimeSettings {
     pub digest: u64,
     /// Distinguishes this incarnation of the router from its others; not 0.
     pub incarnation: u64,
+}
+
+impl TimeSettings {
+    /// Settings of the clock of this router.
+    pub fn of(router: &Settings, masters: &[NodeIndex], interval: Duration) -> Self {
+        let Settings { system, own, digest, incarnation, .. } = *router;
+        Self { system, own, nodes: router.nodes.len() as u8, masters: masters.into(), interval, digest, incarnation }
+    }
 }
 
 /// Role of a node.

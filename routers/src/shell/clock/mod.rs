@@ -23,6 +23,7 @@ pub(super) use runtime::ClockRuntime;
 pub use state::{ClockSnapshot, ClockState};
 
 use crate::driver::ClockStep;
+use crate::frame::NodeIndex;
 use crate::impair;
 use crate::settings::Settings;
 use crate::time::{Exchange, TimeSettings};
@@ -79,19 +80,20 @@ impl ClockParts {
     /// The clock of a router of this installation; none unless its time comes from a master.
     pub fn new(router: &Settings, installation: &Installation, node: &Arc<Node>) -> Option<Self> {
         let TimeSource::Master { masters, interval } = &installation.time else { return None };
-        let port = router.network.time_port();
-        let settings = TimeSettings {
-            system: router.system,
-            own: router.own,
-            nodes: router.nodes.len() as u8,
-            masters: masters.clone(),
-            interval: *interval,
-            digest: router.digest,
-            incarnation: router.incarnation,
-        };
-        let nodes = router.nodes.iter().map(|node| SocketAddr::new(node.address, port)).collect();
         let node = Some(node.clone());
-        Some(Self { settings, nodes, node, impair: None, kernel_stamps: true, skew: None, observer: None })
+        Some(Self { node, ..Self::of_router(router, masters, *interval) })
+    }
+
+    /// The clock of a router, without a page.
+    pub fn of_router(router: &Settings, masters: &[NodeIndex], interval: Duration) -> Self {
+        let port = router.network.time_port();
+        let nodes = router.nodes.iter().map(|node| SocketAddr::new(node.address, port)).collect();
+        Self::at(nodes, TimeSettings::of(router, masters, interval))
+    }
+
+    /// A clock with stamps of the kernel, without a page; `nodes` as above.
+    pub fn at(nodes: Vec<SocketAddr>, settings: TimeSettings) -> Self {
+        Self { settings, nodes, node: None, impair: None, kernel_stamps: true, skew: None, observer: None }
     }
 }
 

@@ -266,7 +266,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "these are tests")]
 
     use super::*;
-    use crate::time::TimeSettings;
+    use crate::harness::time_settings;
     use std::net::UdpSocket;
     use std::time::Duration;
 
@@ -277,24 +277,9 @@ mod tests {
             let peer = UdpSocket::bind(("127.9.3.2", 0)).unwrap();
             let port = peer.local_addr().unwrap().port();
             let nodes = [1, 2].map(|host| SocketAddr::from(([127, 9, 3, host], port)));
-            let settings = TimeSettings {
-                system: 1,
-                own: 0,
-                nodes: 2,
-                masters: vec![0],
-                interval: Duration::from_millis(100),
-                digest: 7,
-                incarnation: 1,
-            };
-            let parts = ClockParts {
-                settings,
-                nodes: nodes.to_vec(),
-                node: None,
-                impair: impair.map(|text| text.parse().unwrap()),
-                kernel_stamps: false,
-                skew: None,
-                observer: None,
-            };
+            let settings = time_settings(0, &[0], Duration::from_millis(100));
+            let impair = impair.map(|text| text.parse().unwrap());
+            let parts = ClockParts { impair, kernel_stamps: false, ..ClockParts::at(nodes.to_vec(), settings) };
             let mut runtime = ClockRuntime::new(parts).unwrap();
             (0..40).for_each(|_| assert_eq!(peer.send_to(&[0; 10], nodes[0]).unwrap(), 10));
             runtime.take(16, |_, _| {});

@@ -1,6 +1,7 @@
 //! Clocks on this computer, each with a wrong monotonic clock of its own: so the true error of each reading is known.
 
 use super::{ClockParts, ClockService, ClockSnapshot, Skew};
+use crate::harness::time_settings;
 use crate::time::{Exchange, Role, TimeSettings};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_testbed::stalls::{Late, unless_stalled};
@@ -43,23 +44,14 @@ impl Clocks {
 
     fn start(&mut self, node: u8) {
         let (observer, exchanges) = sync_channel(1 << 16);
-        let settings = TimeSettings {
-            system: 1,
-            own: node,
-            nodes: self.parts.len() as u8,
-            masters: vec![0, 1],
-            interval: self.interval,
-            digest: 7,
-            incarnation: monotonic_ns(),
-        };
+        let settings = time_settings(node, &[0, 1], self.interval);
+        let settings = TimeSettings { nodes: self.parts.len() as u8, incarnation: monotonic_ns(), ..settings };
+        let addresses = self.parts.iter().map(|(_, address)| *address).collect();
         let service = ClockService::start(ClockParts {
-            settings,
-            nodes: self.parts.iter().map(|(_, address)| *address).collect(),
-            node: None,
-            impair: None,
             kernel_stamps: self.kernel_stamps,
             skew: Some(self.parts[usize::from(node)].0),
             observer: Some(observer),
+            ..ClockParts::at(addresses, settings)
         });
         self.services[usize::from(node)] = Some(service.unwrap());
         self.exchanges[usize::from(node)] = exchanges;
