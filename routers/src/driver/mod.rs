@@ -33,14 +33,14 @@ mod timing;
 
 pub use answer::{ANSWER_BYTES, ANSWERS, Answer};
 pub use clock::{ClockDriver, ClockStep, TimeStart};
-pub use free::{FreeDriver, FreeStep, Handover, Inlet, Nowhere, RealTimeOutlet, Wakes};
+pub use free::{FreeDriver, FreeStep, Handover, Inlet, Wakes};
 pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};
-pub use outlet::Outlet;
+pub use outlet::{Outlet, OutletStep};
 pub use parts::part_for_slot;
 pub use platform::{NotSent, Platform, SlotEvent};
-pub use replicas::{ReplicaDriver, ReplicaWait, part_queue};
-pub use rest::{RestDriver, RestInlet, RestStep};
+pub use replicas::{ReplicaDriver, part_queue};
+pub use rest::{RestDriver, RestInlet};
 pub use rx::{RxDriver, RxPlatform};
 pub use slots::SlotDriver;
 pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeSource};

@@ -1,5 +1,6 @@
 //! What a thread that sends as packages come has of the system behind its queue, and what it does with that.
 
+use super::free::Handover;
 use super::platform::NotSent;
 use crate::frame::NodeIndex;
 use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, OutboundStep, Package};
@@ -32,6 +33,27 @@ pub trait Outlet {
     fn blocked(&self) -> (u64, u64);
     /// Sends what an impairment delayed for long enough; when it has more, ns.
     fn deliver(&mut self, now_ns: u64) -> u64;
+    /// The way to the thread that sends what is not real time; none where there is none.
+    fn rest(&mut self) -> Option<&mut dyn Handover> {
+        None
+    }
+}
+
+/// What a thread below real time does until its driver is polled again.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum OutletStep {
+    /// Poll it at once.
+    Again,
+    /// The rate limit holds the wire: sleep.
+    Sleep {
+        /// For so long, ns.
+        for_ns: u64,
+    },
+    /// Wait for packages or records.
+    Wait {
+        /// For so long, ns.
+        for_ns: u64,
+    },
 }
 
 /// Takes packages, and sends what the queue lets go.

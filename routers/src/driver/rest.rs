@@ -1,7 +1,7 @@
 //! Sends what is not real time as packages come: what to take from the thread that reads the mailbox, and for how long
 //! to wait.
 
-use super::outlet::{Outlet, Transmitter};
+use super::outlet::{Outlet, OutletStep, Transmitter};
 use crate::outbound::Package;
 use crate::settings::Settings;
 
@@ -22,24 +22,6 @@ pub trait RestInlet {
     fn take(&mut self, what: impl FnOnce(&mut Self::Outlet, &Package<'_>, bool)) -> bool;
 }
 
-/// What to do until it is polled again.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum RestStep {
-    /// Poll it at once.
-    Again,
-    /// The rate limit holds the wire: sleep. More packages wait in the mailbox, where less important ones are
-    /// displaced.
-    Sleep {
-        /// For so long, ns.
-        for_ns: u64,
-    },
-    /// Wait for packages.
-    Wait {
-        /// For so long, ns.
-        for_ns: u64,
-    },
-}
-
 /// Sends what is not real time, where that has threads of its own.
 pub struct RestDriver {
     transmitter: Transmitter,
@@ -52,16 +34,17 @@ impl RestDriver {
     }
 
     /// Does what is due, one datagram at most beside those that leave at once.
-    pub fn poll(&mut self, on: &mut impl RestInlet) -> RestStep {
+    pub fn poll(&mut self, on: &mut impl RestInlet) -> OutletStep {
         self.take(on);
         let outlet = on.outlet();
         let now_ns = outlet.monotonic_ns();
-        let Some(until_ns) = self.transmitter.step(outlet, now_ns) else { return RestStep::Again };
+        let Some(until_ns) = self.transmitter.step(outlet, now_ns) else { return OutletStep::Again };
         let until_ns = until_ns.min(outlet.deliver(now_ns));
         let (outbound, _) = outlet.queue();
+        // More packages wait in the mailbox, where less important ones are displaced.
         let look_ns = if outbound.waits() { LOOK_AGAIN_NS } else { LOOK_NS };
         let for_ns = until_ns.saturating_sub(now_ns).min(look_ns);
-        if outbound.has_plenty() { RestStep::Sleep { for_ns } } else { RestStep::Wait { for_ns } }
+        if outbound.has_plenty() { OutletStep::Sleep { for_ns } } else { OutletStep::Wait { for_ns } }
     }
 
     /// Takes packages while they are of use.

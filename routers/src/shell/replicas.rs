@@ -19,7 +19,7 @@ use super::threads::{Shared, schedule_below};
 use super::wire::PeerSockets;
 use super::{Shell, ShellError};
 use crate::counts::Cause;
-use crate::driver::{ReplicaDriver, ReplicaWait, RxDriver, part_queue};
+use crate::driver::{OutletStep, ReplicaDriver, RxDriver, part_queue};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
 use crate::impair;
 use crate::replication::{Describe, OneWayClock, ReplicaCounts, ReplicaReceiver, ReplicaSender, ReplicaSettings};
@@ -111,9 +111,9 @@ impl ReplicaTx {
                 self.sender.look(&self.participant, &*self.describe);
             }
             match self.driver.poll(&mut self.sending, |ns| self.clock.at(ns), &mut self.sender) {
-                ReplicaWait::Again => {}
-                ReplicaWait::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
-                ReplicaWait::Wait { for_ns } => self.wait(Duration::from_nanos(for_ns)),
+                OutletStep::Again => {}
+                OutletStep::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
+                OutletStep::Wait { for_ns } => self.wait(Duration::from_nanos(for_ns)),
             }
         }
     }

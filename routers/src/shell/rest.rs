@@ -13,7 +13,7 @@ use super::socket::{InSocket, REST_BYTES};
 use super::threads::{Shared, schedule_below};
 use super::wire::PeerSockets;
 use super::{Shell, ShellError, transit};
-use crate::driver::{RestDriver, RestInlet, RestStep, RxDriver};
+use crate::driver::{OutletStep, RestDriver, RestInlet, RxDriver};
 use crate::impair;
 use crate::outbound::{Outbound, Package};
 use crate::security::{Gate, Port, Sealing};
@@ -55,9 +55,9 @@ impl Rest {
     pub(super) fn run(mut self) {
         while !self.shared.ends() {
             match self.driver.poll(&mut self.inlet) {
-                RestStep::Again => {}
-                RestStep::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
-                RestStep::Wait { for_ns } => {
+                OutletStep::Again => {}
+                OutletStep::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
+                OutletStep::Wait { for_ns } => {
                     if self.inlet.taker.wait(Duration::from_nanos(for_ns)) == Waited::Ended {
                         return;
                     }

@@ -11,7 +11,7 @@ use crate::driver::{
 use crate::frame::NodeIndex;
 use crate::impair::{Impairment, ImpairmentStep};
 use crate::security::PeerSessions;
-use crate::time::{Clock, Exchange, InSlots, Looked, SentId, Stamp, TIME_BYTES, Unsteady};
+use crate::time::{Clock, Exchange, InSlots, Looked, SentId, Stamp, Unsteady};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, Watched, monotonic_ns, realtime_ns};
 use std::net::{IpAddr, SocketAddr};
 use std::os::fd::{AsFd, BorrowedFd};
@@ -28,13 +28,13 @@ struct DelayedArrival {
 
 /// All of a clock but its thread.
 pub(in crate::shell) struct ClockRuntime {
-    driver: ClockDriver,
-    system: TimeSystem,
+    pub(in crate::shell) driver: ClockDriver,
+    pub(in crate::shell) system: TimeSystem,
 }
 
 /// What the driver has of the system.
-struct TimeSystem {
-    local: LocalClock,
+pub(in crate::shell) struct TimeSystem {
+    pub(in crate::shell) local: LocalClock,
     socket: TimeSocket,
     keeper: Option<TimeKeeper>,
     impairment: Option<Impairment<DelayedArrival>>,
@@ -42,7 +42,8 @@ struct TimeSystem {
     held_ns: u64,
     observer: Option<SyncSender<Exchange>>,
     state: Arc<ClockState>,
-    real_time: bool,
+    /// Whether the thread goes before others.
+    pub(in crate::shell) real_time: bool,
 }
 
 impl ClockRuntime {
@@ -98,49 +99,9 @@ impl ClockRuntime {
         &self.system.state
     }
 
-    /// What is known of system time.
-    pub(in crate::shell) fn clock(&self) -> &Clock {
-        self.driver.clock()
-    }
-
-    /// The same, to be changed.
-    pub(in crate::shell) fn clock_mut(&mut self) -> &mut Clock {
-        self.driver.clock_mut()
-    }
-
-    /// Local time.
-    pub(in crate::shell) fn now_ns(&self) -> u64 {
-        self.system.local.now_ns()
-    }
-
-    /// Whether its thread goes before others.
-    pub(in crate::shell) fn runs_in_real_time(&mut self, does: bool) {
-        self.system.real_time = does;
-    }
-
     /// Does what is due: see [`ClockDriver::poll`].
     pub(super) fn poll(&mut self) -> ClockStep {
         self.driver.poll(&mut self.system)
-    }
-
-    /// Hands a datagram of time to the kernel.
-    pub(in crate::shell) fn send(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]) {
-        self.driver.send(&mut self.system, to, datagram);
-    }
-
-    /// See [`ClockDriver::take`].
-    pub(in crate::shell) fn take(&mut self, most: usize, left: impl FnMut(SentId, Stamp)) {
-        self.driver.take(&mut self.system, most, left);
-    }
-
-    /// See [`ClockDriver::take_stranger`].
-    pub(in crate::shell) fn take_stranger(&mut self) -> Option<IpAddr> {
-        self.driver.take_stranger()
-    }
-
-    /// Lets others see how it stands: writes the node's page, and shows it to tools.
-    pub(in crate::shell) fn publish(&mut self) {
-        self.driver.publish(&mut self.system);
     }
 }
 
@@ -282,7 +243,7 @@ mod tests {
             let parts = ClockParts { impair, kernel_stamps: false, ..ClockParts::at(nodes.to_vec(), settings) };
             let mut runtime = ClockRuntime::new(parts).unwrap();
             (0..40).for_each(|_| assert_eq!(peer.send_to(&[0; 10], nodes[0]).unwrap(), 10));
-            runtime.take(16, |_, _| {});
+            runtime.driver.take(&mut runtime.system, 16, |_, _| {});
             let socket = &mut runtime.system.socket;
             let left = std::iter::from_fn(|| socket.receive(&mut [0; TIME_DATAGRAM_BYTES])).count();
             assert_eq!(left, 24, "{impair:?}");
