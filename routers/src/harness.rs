@@ -12,7 +12,7 @@ use crate::settings::{NodeSettings, Settings};
 use crate::stats::Stats;
 use crate::time::TimeSettings;
 use crate::time::message::{MESSAGE_BYTES, TimeMessage};
-use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_mailbox::{Head, Name, Node, Participant, Priority, Receiver, Shape, Type};
 use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
@@ -98,6 +98,28 @@ pub(crate) fn flow(from: Name, to: Name, size: u32) -> Flow {
 
 pub(crate) fn head(to: Name, from: Name, priority: u8) -> Head {
     Head { to, from, priority: Priority(priority), kind: Type::data(1), ..Head::default() }
+}
+
+/// A node's memory; its folder goes with it.
+pub(crate) struct TestNode {
+    pub(crate) node: Arc<Node>,
+    _folder: tempfile::TempDir,
+}
+
+impl TestNode {
+    pub(crate) fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        Self { node: Node::create(&folder.path().join("node"), 0o700).unwrap(), _folder: folder }
+    }
+
+    pub(crate) fn join(&self) -> Arc<Participant> {
+        Participant::join(&self.node, Name::NONE).unwrap()
+    }
+
+    /// A mailbox with so many slots for bodies of this size.
+    pub(crate) fn mailbox(&self, name: Name, slots: u16, body_bytes_max: u16) -> Receiver {
+        self.join().receiver(name, Shape { slots, body_bytes_max, ..Shape::default() }).unwrap()
+    }
 }
 
 #[derive(Default)]

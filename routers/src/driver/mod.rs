@@ -43,5 +43,5 @@ pub use replicas::{ReplicaDriver, part_queue};
 pub use rest::{RestDriver, RestInlet};
 pub use rx::{RxDriver, RxPlatform};
 pub use slots::SlotDriver;
-pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeSource};
+pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeEvent, TimeInput, TimePlatform, TimeSource};
 pub use timing::{SlotStep, spin_ns};

@@ -10,7 +10,7 @@ use super::rx_thread::{PackageDelivery, RxSystem, RxThread};
 use super::sender_cache::SenderCache;
 use super::sending::Sending;
 use super::socket::{InSocket, REST_BYTES};
-use super::threads::{Shared, schedule_below};
+use super::threads::Shared;
 use super::wire::PeerSockets;
 use super::{Shell, ShellError, transit};
 use crate::driver::{OutletStep, RestDriver, RestInlet, RxDriver};
@@ -119,14 +119,8 @@ impl Shell {
         self.sockets.push(socket);
         self.rest_stats = Some(stats);
         let tx_thread = Rest { shared, driver: RestDriver::new(&settings), inlet: HandoverInlet { taker, sending } };
-        self.begin("rest-out", move || {
-            schedule_below();
-            tx_thread.run();
-        })?;
-        self.begin("rest-in", move || {
-            schedule_below();
-            rx_thread.run();
-        })?;
+        self.begin_below("rest-out", move || tx_thread.run())?;
+        self.begin_below("rest-in", move || rx_thread.run())?;
         Ok(Some(giver))
     }
 }

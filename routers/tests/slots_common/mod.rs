@@ -271,6 +271,11 @@ impl Segment {
         running.flat_map(|(own, stats)| of((own, stats))).collect()
     }
 
+    /// All routers of this process send, and hear each other.
+    pub(crate) fn wait_until_all_send(&self) {
+        self.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    }
+
     pub(crate) fn wait_until(&self, what: &str, mut done: impl FnMut(&Self) -> bool) {
         let began = Instant::now();
         while !done(self) {

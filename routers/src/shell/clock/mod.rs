@@ -26,7 +26,7 @@ use crate::driver::ClockStep;
 use crate::frame::NodeIndex;
 use crate::impair;
 use crate::settings::Settings;
-use crate::time::{Exchange, TimeSettings};
+use crate::time::TimeSettings;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use rohrpost_config::{FIFO_MAX, Installation, TimeSource};
@@ -36,7 +36,6 @@ use std::io::{self, PipeReader, PipeWriter};
 use std::net::SocketAddr;
 use std::os::fd::AsFd;
 use std::sync::Arc;
-use std::sync::mpsc::SyncSender;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -72,8 +71,6 @@ pub struct ClockParts {
     pub kernel_stamps: bool,
     /// For tests: see [`Skew`].
     pub skew: Option<Skew>,
-    /// For measurements: each exchange, as long as there is room.
-    pub observer: Option<SyncSender<Exchange>>,
 }
 
 impl ClockParts {
@@ -93,7 +90,7 @@ impl ClockParts {
 
     /// A clock with stamps of the kernel, without a page; `nodes` as above.
     pub fn at(nodes: Vec<SocketAddr>, settings: TimeSettings) -> Self {
-        Self { settings, nodes, node: None, impair: None, kernel_stamps: true, skew: None, observer: None }
+        Self { settings, nodes, node: None, impair: None, kernel_stamps: true, skew: None }
     }
 }
 

@@ -6,17 +6,16 @@ use super::socket::{ReceivedDatagram, TimeSocket};
 use super::state::{ClockSnapshot, ClockState};
 use super::{ClockError, ClockParts};
 use crate::driver::{
-    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeStart,
+    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeEvent, TimeInput, TimePlatform, TimeStart,
 };
 use crate::frame::NodeIndex;
 use crate::impair::{Impairment, ImpairmentStep};
 use crate::security::PeerSessions;
-use crate::time::{Clock, Exchange, InSlots, Looked, SentId, Stamp, Unsteady};
+use crate::time::{Clock, InSlots, Looked, SentId, Stamp, Unsteady};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, Watched, monotonic_ns, realtime_ns};
 use std::net::{IpAddr, SocketAddr};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::Arc;
-use std::sync::mpsc::SyncSender;
 
 /// What the impairment keeps besides the bytes.
 #[derive(Clone, Copy)]
@@ -40,7 +39,6 @@ pub(in crate::shell) struct TimeSystem {
     impairment: Option<Impairment<DelayedArrival>>,
     /// When the impairment has more, local ns.
     held_ns: u64,
-    observer: Option<SyncSender<Exchange>>,
     state: Arc<ClockState>,
     /// Whether the thread goes before others.
     pub(in crate::shell) real_time: bool,
@@ -49,7 +47,7 @@ pub(in crate::shell) struct TimeSystem {
 impl ClockRuntime {
     /// Binds the socket. What an earlier incarnation of this router wrote in the node's page goes on.
     pub(in crate::shell) fn new(parts: ClockParts) -> Result<Self, ClockError> {
-        let ClockParts { settings, nodes, node, impair, kernel_stamps, skew, observer } = parts;
+        let ClockParts { settings, nodes, node, impair, kernel_stamps, skew } = parts;
         let own = settings.own;
         let at = nodes.get(usize::from(own)).copied().unwrap_or(SocketAddr::new(IpAddr::from([0; 16]), 0));
         let socket = TimeSocket::open(at, &nodes, settings.digest, kernel_stamps)
@@ -72,7 +70,6 @@ impl ClockRuntime {
             keeper,
             impairment: impair.map(|impair| Impairment::new(impair, u64::from(own) | 0x7469_6d65_0000)),
             held_ns: u64::MAX,
-            observer,
             state: Arc::new(ClockState::new(snapshot)),
             real_time: false,
         };
@@ -166,10 +163,9 @@ impl TimePlatform for TimeSystem {
         self.keeper.iter_mut().for_each(|keeper| keeper.note_watched(watched));
     }
 
-    fn publish(&mut self, clock: &Clock, counts: TimeCounts) {
-        let TimeCounts { exchanges, by_kernel, ignored } = counts;
+    fn publish(&mut self, clock: &Clock, ignored: u64) {
         let seen = ClockSnapshot::of(clock, self.local.now_ns());
-        self.state.show(&ClockSnapshot { exchanges, by_kernel, ignored, real_time: self.real_time, ..seen });
+        self.state.show(&ClockSnapshot { ignored, real_time: self.real_time, ..seen });
     }
 
     fn take_new_epoch(&mut self) -> Option<u64> {
@@ -181,12 +177,6 @@ impl TimePlatform for TimeSystem {
             TimeEvent::Unsteady { why, is_new: true } => warn_unsteady(why),
             TimeEvent::NotOpened { source, why: Some((why, datagrams)) } => {
                 tracing::warn!("takes no time from {source}: {why} (datagrams: {datagrams})");
-            }
-            TimeEvent::Measured(exchange) => {
-                if let Some(observer) = &self.observer {
-                    // An observer that does not keep up misses some.
-                    let _ = observer.try_send(*exchange);
-                }
             }
             _ => {}
         }

@@ -2,7 +2,7 @@
 
 use crate::frame::NodeIndex;
 use crate::replication::MeasuredRoundTrip;
-use crate::time::{Clock, Reading, Role, Term};
+use crate::time::{Clock, Exchanges, Reading, Role, Term};
 use rohrpost_mailbox::TimeRecord;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -43,6 +43,7 @@ pub struct ClockSnapshot {
 impl ClockSnapshot {
     pub(super) fn of(clock: &Clock, now_ns: u64) -> Self {
         let Reading { term, synchronised, .. } = clock.reading(now_ns);
+        let Exchanges { count: exchanges, by_kernel } = clock.exchanges();
         Self {
             role: clock.role(),
             master: clock.master(),
@@ -53,9 +54,9 @@ impl ClockSnapshot {
             rate_ppb: clock.rate_ppb(),
             delay_ns: clock.delay_ns(),
             heard_ns: clock.heard_ns(now_ns),
-            exchanges: 0,
+            exchanges,
             contradictions: clock.contradictions(),
-            by_kernel: false,
+            by_kernel,
             ignored: 0,
             real_time: false,
         }
