@@ -57,19 +57,19 @@ pub enum OutletStep {
 }
 
 /// Takes packages, and sends what the queue lets go.
-pub(super) struct Transmitter {
+pub(crate) struct Transmitter {
     /// Room for the largest datagram, and its seal.
     datagram: Box<[u8]>,
 }
 
 impl Transmitter {
-    pub(super) fn new(settings: &Settings) -> Self {
+    pub(crate) fn new(settings: &Settings) -> Self {
         let bytes = settings.network.datagram_bytes_max + settings.network.security.tag_bytes();
         Self { datagram: vec![0; bytes].into() }
     }
 
     /// Takes a package: sends or queues it. `alone`: see [`Outbound::accept`].
-    pub(super) fn accept(&mut self, on: &mut impl Outlet, package: &Package<'_>, alone: bool) {
+    pub(crate) fn accept(&mut self, on: &mut impl Outlet, package: &Package<'_>, alone: bool) {
         let (now_ns, body) = (on.monotonic_ns(), package.body);
         let (outbound, mut report) = on.queue();
         let Accepted::Send { to, head } = outbound.accept(now_ns, package, alone, &mut report) else { return };
@@ -87,7 +87,7 @@ impl Transmitter {
     }
 
     /// Sends the next datagram; else returns when there is one, unless a package comes.
-    pub(super) fn step(&mut self, on: &mut impl Outlet, now_ns: u64) -> Option<u64> {
+    pub(crate) fn step(&mut self, on: &mut impl Outlet, now_ns: u64) -> Option<u64> {
         on.retry(now_ns);
         pass_over_blocked(on);
         let (outbound, mut report) = on.queue();

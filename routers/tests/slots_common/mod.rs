@@ -19,7 +19,7 @@ use rohrpost_mailbox::{
 };
 use rohrpost_network::{Tdma, Tunnel};
 use rohrpost_routers::counts::Cause;
-use rohrpost_routers::frame::{Alive, FrameHead, FrameKind};
+use rohrpost_routers::frame::{FrameHead, FrameKind};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::Lab;
 use rohrpost_routers::security::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
@@ -62,9 +62,7 @@ pub(crate) fn at(node: u8) -> SocketAddr {
 
 /// "Still there", from a node that was launched from another file.
 pub(crate) fn of_another_digest(from: u8, to: u8) -> Vec<u8> {
-    let alive = Alive::default().to_bytes();
-    let head = FrameHead { kind: FrameKind::Alive, system: 1, from, to, digest: 8, incarnation: 1, sequence: 0 };
-    [&head.to_bytes(&[&alive])[..], &alive].concat()
+    lan::alive(FrameHead { kind: FrameKind::Alive, system: 1, from, to, digest: 8, incarnation: 1, sequence: 0 })
 }
 
 /// Kinds of the datagrams that came, until none comes for a moment.

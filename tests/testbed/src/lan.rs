@@ -1,14 +1,15 @@
-//! Nodes of a LAN with real routers: their names, settings and slots, and namespaces for them.
+//! Nodes of a LAN with real routers: their names, settings and slots, and namespaces and processes for them.
 
 use crate::report;
 use rohrpost_mailbox::Name;
 use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot};
 use rohrpost_routers::admission::Admission;
-use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::frame::{Alive, FrameHead, NodeIndex};
 pub use rohrpost_routers::lab::Lab;
 use rohrpost_routers::lab::{LabError, NodeSpec};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use std::net::IpAddr;
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 /// The module of a node; its mailboxes take what the others send.
@@ -70,6 +71,31 @@ pub fn slots(nodes: NodeIndex, first_us: u64, [cycle_us, length_us]: [u64; 2]) -
         slots: (0..nodes).map(slot).collect(),
         tunnel: None,
     }
+}
+
+/// "Still there", with this head, from a router that hears nobody.
+pub fn alive(head: FrameHead) -> Vec<u8> {
+    let alive = Alive::default().to_bytes();
+    [&head.to_bytes(&[&alive])[..], &alive].concat()
+}
+
+/// A process that is killed when this is dropped.
+pub struct Killed(pub Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// One test of this program, as a process of its own with this variable in its environment.
+pub fn role(test: &str, variable: &str, value: &str) -> Command {
+    let program = std::env::current_exe().unwrap_or_else(|error| panic!("this program: {error}"));
+    let mut command = Command::new(program);
+    command.args(["--exact", test, "--nocapture", "--test-threads=1"]).env(variable, value);
+    command.stdin(Stdio::null()).stdout(Stdio::null());
+    command
 }
 
 /// Nodes `n0`, `n1` and so on with these addresses.
