@@ -18,8 +18,6 @@ pub struct Used {
     pub by_kernel: bool,
     /// Datagrams.
     pub datagrams: u64,
-    /// Their bytes on the wire, all heads counted.
-    pub wire_bytes: u64,
     /// The last one was decided on when it would still be off the wire so long before the end, ns. Never less than 0.
     pub spare_ns: i64,
     /// The call for the last one came back so long after the end, ns; 0: not after it.
@@ -55,7 +53,6 @@ impl WindowLog {
             off_ns: first_ns.wrapping_sub(tx_window.begin_ns).cast_signed(),
             by_kernel: false,
             datagrams: tx_window.datagrams(),
-            wire_bytes: tx_window.wire_bytes(),
             spare_ns: tx_window.spare_ns(),
             over_ns,
         });

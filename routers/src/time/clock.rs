@@ -97,7 +97,6 @@ pub struct Clock {
     last_id: u64,
     exchanges: Exchanges,
     offset_ns: i64,
-    contradictions: u64,
     /// Nodes of another configuration.
     others: Others,
     /// Whether the local clock keeps its limits.
@@ -145,7 +144,6 @@ impl Clock {
             last_id: 0,
             exchanges: Exchanges::default(),
             offset_ns: 0,
-            contradictions: 0,
             others: Others::new(settings.nodes),
             steadiness: Steadiness::default(),
             slots: None,
@@ -289,11 +287,6 @@ impl Clock {
     /// Round-trip delay of the best exchange that counts, ns.
     pub fn delay_ns(&self) -> Option<u64> {
         self.history.delay_ns()
-    }
-
-    /// How often contradictory samples were thrown away: a clock broke its limits.
-    pub fn contradictions(&self) -> u64 {
-        self.contradictions
     }
 
     /// Exchanges so far.

@@ -152,7 +152,7 @@ struct Worker {
 impl Worker {
     fn run(&mut self) {
         // The router's other threads tell when it is refused.
-        self.runtime.system.real_time = schedule(Scheduling::Fifo(FIFO)).is_ok();
+        let _ = schedule(Scheduling::Fifo(FIFO));
         loop {
             let ClockStep { for_ns, reads } = self.runtime.poll();
             if self.sleep(Duration::from_nanos(for_ns), reads) {

@@ -40,8 +40,6 @@ pub(in crate::shell) struct TimeSystem {
     /// When the impairment has more, local ns.
     held_ns: u64,
     state: Arc<ClockState>,
-    /// Whether the thread goes before others.
-    pub(in crate::shell) real_time: bool,
 }
 
 impl ClockRuntime {
@@ -71,7 +69,6 @@ impl ClockRuntime {
             impairment: impair.map(|impair| Impairment::new(impair, u64::from(own) | 0x7469_6d65_0000)),
             held_ns: u64::MAX,
             state: Arc::new(ClockState::new(snapshot)),
-            real_time: false,
         };
         unsteady.into_iter().for_each(warn_unsteady);
         driver.clock().watched().into_iter().for_each(|watched| system.note_watched(&watched));
@@ -165,7 +162,7 @@ impl TimePlatform for TimeSystem {
 
     fn publish(&mut self, clock: &Clock, ignored: u64) {
         let seen = ClockSnapshot::of(clock, self.local.now_ns());
-        self.state.show(&ClockSnapshot { ignored, real_time: self.real_time, ..seen });
+        self.state.show(&ClockSnapshot { ignored, ..seen });
     }
 
     fn take_new_epoch(&mut self) -> Option<u64> {

@@ -26,18 +26,12 @@ pub struct ClockSnapshot {
     pub rate_ppb: i64,
     /// Shortest recent round trip, ns.
     pub delay_ns: Option<u64>,
-    /// When the master was heard last, monotonic ns.
-    pub heard_ns: Option<u64>,
-    /// Exchanges so far; and how often a clock did what it must not.
+    /// Exchanges so far.
     pub exchanges: u64,
-    /// See [`Clock::contradictions`].
-    pub contradictions: u64,
     /// Whether all stamps of the last exchange were the kernel's.
     pub by_kernel: bool,
     /// Datagrams that were not taken.
     pub ignored: u64,
-    /// Whether the thread runs in real time.
-    pub real_time: bool,
 }
 
 impl ClockSnapshot {
@@ -53,12 +47,9 @@ impl ClockSnapshot {
             offset_ns: clock.offset_ns(),
             rate_ppb: clock.rate_ppb(),
             delay_ns: clock.delay_ns(),
-            heard_ns: clock.heard_ns(now_ns),
             exchanges,
-            contradictions: clock.contradictions(),
             by_kernel,
             ignored: 0,
-            real_time: false,
         }
     }
 }

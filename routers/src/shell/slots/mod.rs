@@ -123,7 +123,6 @@ impl SlotThread {
         let Self { mut driver, mut system } = self;
         sleep::be_punctual();
         system.snapshot.granted = ActualScheduling::ask(driver.scheduler().table());
-        system.clock.system.real_time = system.snapshot.granted != ActualScheduling::Ordinary;
         while !system.shared.ends() {
             match driver.poll(&mut system) {
                 SlotStep::Sleep { for_ns } => sleep::sleep(for_ns),

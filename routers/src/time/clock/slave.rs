@@ -91,7 +91,6 @@ impl Clock {
     pub(super) fn scheduler(&mut self, now_ns: u64, newest: OffsetSample) {
         let ElectionState::Slave(master) = self.election.state() else { return };
         let Some(estimate) = self.history.estimate(now_ns, self.usual_rate) else {
-            self.contradictions += 1;
             self.forget();
             self.history.add(newest);
             return;
