@@ -7,8 +7,8 @@
 //! ```
 //!
 //! [`SlotDriver`] sends in time slots, parts of replicas too. Without them [`FreeDriver`] sends what is real time,
-//! and [`ReplicaDriver`] parts of replicas; a thread of the shell sends the rest. [`RxDriver`] receives, and [`ClockDriver`] keeps
-//! time.
+//! and [`ReplicaDriver`] parts of replicas; a thread of the shell sends the rest. [`RxDriver`] receives, and
+//! [`ClockDriver`] keeps time.
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 

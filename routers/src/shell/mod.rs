@@ -335,14 +335,6 @@ impl Shell {
         Ok(())
     }
 
-    /// Starts a thread that is scheduled below all that are in real time.
-    fn begin_below(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), ShellError> {
-        self.begin(name, move || {
-            threads::schedule_below();
-            run();
-        })
-    }
-
     /// State of system time; none unless that comes from a master.
     pub fn clock(&self) -> Option<&Arc<ClockState>> {
         self.clock.as_ref()

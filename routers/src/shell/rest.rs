@@ -1,7 +1,8 @@
 //! The thread that sends what is not real time: scheduled like the modules that it serves, below all real-time threads.
 //!
-//! It has a queue, sockets and a port of its own. It shares the wire's rate with real time, which goes first. A second thread receives at that port. So the kernel separates
-//! both kinds before any thread runs, and a flood of one takes no room or time from the other.
+//! It has a queue, sockets and a port of its own. It shares the wire's rate with real time, which goes first. A second
+//! thread receives at that port. So the kernel separates both kinds before any thread runs, and a flood of one takes no
+//! room or time from the other.
 
 use super::answers::{ErrorReplier, Faults};
 use super::handover::{BatchReceiver, BatchSender, Waited, handover};
@@ -9,7 +10,7 @@ use super::rx_thread::{PackageDelivery, RxSystem, RxThread};
 use super::sender_cache::SenderCache;
 use super::sending::Sending;
 use super::socket::{InSocket, REST_BYTES};
-use super::threads::Shared;
+use super::threads::{Shared, schedule_below};
 use super::wire::PeerSockets;
 use super::{Shell, ShellError, transit};
 use crate::driver::{Outlet, OutletStep, RxDriver, Transmitter};
@@ -81,6 +82,14 @@ impl Rest {
 }
 
 impl Shell {
+    /// Starts a thread that is scheduled below all that are in real time.
+    pub(super) fn begin_below(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), ShellError> {
+        self.begin(name, move || {
+            schedule_below();
+            run();
+        })
+    }
+
     /// Opens the port and starts the two threads for what is not real time, if that is separate. Returns the handover
     /// for the thread that reads the mailbox.
     pub(super) fn begin_rest(

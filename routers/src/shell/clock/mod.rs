@@ -88,7 +88,7 @@ impl ClockParts {
         Self::at(nodes, TimeSettings::of(router, masters, interval))
     }
 
-    /// A clock with stamps of the kernel, without a page; `nodes` as above.
+    /// A clock with stamps of the kernel, without a page. `nodes`: where each takes datagrams of time, in order.
     pub fn at(nodes: Vec<SocketAddr>, settings: TimeSettings) -> Self {
         Self { settings, nodes, node: None, impair: None, kernel_stamps: true, skew: None }
     }
