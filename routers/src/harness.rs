@@ -4,14 +4,16 @@
 use crate::admission::Admission;
 use crate::counts::{Cause, Side};
 use crate::flows::Flow;
-use crate::frame::NodeIndex;
+use crate::frame::{FrameHead, NodeIndex};
 use crate::inbound::{self, Datagram, Inbound};
 use crate::outbound::{Accepted, Outbound, OutboundStep, Package};
 use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
 use crate::settings::{NodeSettings, Settings};
 use crate::stats::Stats;
-use rohrpost_mailbox::{Head, Name, Priority, Type};
-use rohrpost_network::{Network, Route, Security};
+use crate::time::TimeSettings;
+use crate::time::message::{MESSAGE_BYTES, TimeMessage};
+use rohrpost_mailbox::{Head, Name, Node, Participant, Priority, Receiver, Shape, Type};
+use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
 use std::time::Duration;
@@ -61,6 +63,33 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
     }
 }
 
+/// Settings of a clock on one of three nodes.
+pub(crate) fn time_settings(own: NodeIndex, masters: &[NodeIndex], interval: Duration) -> TimeSettings {
+    TimeSettings { incarnation: 9, ..TimeSettings::of(&settings(own, 3), masters, interval) }
+}
+
+/// A frame of time, and the bytes behind its head.
+pub(crate) fn time_frame(
+    (from, to): (NodeIndex, NodeIndex),
+    sequence: u64,
+    message: &TimeMessage,
+) -> (FrameHead, [u8; MESSAGE_BYTES]) {
+    let head = FrameHead { kind: message.kind(), system: 1, from, to, digest: 7, incarnation: 5, sequence };
+    (head, message.to_bytes())
+}
+
+/// A slot of each cycle: its node, where it begins and how long it is, µs.
+pub(crate) fn slot(node: NodeIndex, offset_us: u64, length_us: u64) -> TimeSlot {
+    let us = Duration::from_micros;
+    TimeSlot { node, offset: us(offset_us), length: us(length_us), period: 1, phase: 0 }
+}
+
+/// Slots on a wire of 1 Gbit/s. `lengths_us`: of the cycle, of a master's synchronisation, and of guards.
+pub(crate) fn tdma(lengths_us: [u64; 3], slots: Vec<TimeSlot>) -> Tdma {
+    let [cycle, synchronisation, guard] = lengths_us.map(Duration::from_micros);
+    Tdma { cycle, synchronisation, guard, link_bytes_s: 125_000_000, slots, tunnel: None }
+}
+
 /// A flow that has 10 ms, and for which 5 ms are sure.
 pub(crate) fn flow(from: Name, to: Name, size: u32) -> Flow {
     let ms = Duration::from_millis;
@@ -69,6 +98,28 @@ pub(crate) fn flow(from: Name, to: Name, size: u32) -> Flow {
 
 pub(crate) fn head(to: Name, from: Name, priority: u8) -> Head {
     Head { to, from, priority: Priority(priority), kind: Type::data(1), ..Head::default() }
+}
+
+/// A node's memory; its folder goes with it.
+pub(crate) struct TestNode {
+    pub(crate) node: Arc<Node>,
+    _folder: tempfile::TempDir,
+}
+
+impl TestNode {
+    pub(crate) fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        Self { node: Node::create(&folder.path().join("node"), 0o700).unwrap(), _folder: folder }
+    }
+
+    pub(crate) fn join(&self) -> Arc<Participant> {
+        Participant::join(&self.node, Name::NONE).unwrap()
+    }
+
+    /// A mailbox with so many slots for bodies of this size.
+    pub(crate) fn mailbox(&self, name: Name, slots: u16, body_bytes_max: u16) -> Receiver {
+        self.join().receiver(name, Shape { slots, body_bytes_max, ..Shape::default() }).unwrap()
+    }
 }
 
 #[derive(Default)]

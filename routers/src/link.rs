@@ -46,8 +46,6 @@ pub struct Link {
     pub hears_us_ns: Count,
     /// When it began to say that it does not, ns; 0: it does not say so.
     pub denied_ns: Count,
-    /// When it was first heard after a silence, ns.
-    pub since_ns: Count,
     /// Datagrams of ours that it misses, by its report.
     pub missed_by_it: Count,
     /// When it last refused us because of the configuration, ns; 0: never. And its digest.
@@ -102,8 +100,7 @@ impl Link {
     }
 
     /// Its earlier reports are void: it is heard anew, or could not be heard.
-    pub(crate) fn begin(&self, now_ns: u64) {
-        self.since_ns.set(now_ns);
+    pub(crate) fn begin(&self) {
         self.denied_ns.set(0);
     }
 

@@ -61,7 +61,18 @@ pub(crate) const YOUNG_NS: u64 = 500_000_000;
 impl Stats {
     /// Counters of a router that begins now.
     pub fn new(settings: &Settings, now_ns: u64) -> Arc<Self> {
-        Arc::new(Self {
+        Arc::new(Self::of_router(settings, now_ns))
+    }
+
+    /// Counters of the same router, for the threads of another port: of what is not real time, or of replicas.
+    pub fn of_port(port: Port, settings: &Settings, all: &Arc<Self>) -> Arc<Self> {
+        let (out, inn, flows) = (all.out.clone(), all.inn.clone(), all.flows.clone());
+        let knows = Some(all.clone());
+        Arc::new(Self { out, inn, flows, port, knows, ..Self::of_router(settings, all.started_ns) })
+    }
+
+    fn of_router(settings: &Settings, started_ns: u64) -> Self {
+        Self {
             out: Arc::new(Side::new()),
             inn: Arc::new(Side::new()),
             peers: settings.nodes.iter().map(|_| PeerStats::default()).collect(),
@@ -71,29 +82,10 @@ impl Stats {
             dropped: Count::default(),
             flows: Arc::new(Flows::new(&settings.flows)),
             on_wire_bytes: Count::default(),
-            started_ns: now_ns,
+            started_ns,
             port: Port::Packages,
             knows: None,
-        })
-    }
-
-    /// Counters of the same router, for the threads of another port: of what is not real time, or of replicas.
-    pub fn of_port(port: Port, settings: &Settings, all: &Arc<Self>) -> Arc<Self> {
-        let Self { out, inn, flows, started_ns, .. } = &**all;
-        Arc::new(Self {
-            out: out.clone(),
-            inn: inn.clone(),
-            peers: settings.nodes.iter().map(|_| PeerStats::default()).collect(),
-            waiting: Default::default(),
-            waiting_bytes: Count::default(),
-            foreign: Count::default(),
-            dropped: Count::default(),
-            flows: flows.clone(),
-            on_wire_bytes: Count::default(),
-            started_ns: *started_ns,
-            port,
-            knows: Some(all.clone()),
-        })
+        }
     }
 
     /// Counters of a node; those of the own one stay empty.

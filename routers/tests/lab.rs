@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use nix::sys::socket::{getsockopt, sockopt};
-use rohrpost_routers::lab::{DEVICE, Lab, LabError, NodeSpec};
-use rohrpost_testbed::report;
+use rohrpost_routers::lab::{DEVICE, Lab};
+use rohrpost_testbed::lan;
 use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
@@ -15,21 +15,9 @@ use std::time::{Duration, Instant};
 /// What takes longer does not come any more, however busy the computer is.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-fn specs(addresses: &[&str]) -> Vec<NodeSpec> {
-    let spec =
-        |(index, address): (usize, &&str)| NodeSpec { name: format!("n{index}"), address: address.parse().unwrap() };
-    addresses.iter().enumerate().map(spec).collect()
-}
-
 fn lab(addresses: &[&str], mtu: u16) -> Option<Lab> {
-    match Lab::new(&specs(addresses), mtu) {
-        Ok(lab) => Some(lab),
-        Err(LabError::NotAllowed(error)) => {
-            report::skipped(&format!("network namespaces ({error})"));
-            None
-        }
-        Err(error) => panic!("{error}"),
-    }
+    let addresses: Vec<IpAddr> = addresses.iter().map(|address| address.parse().unwrap()).collect();
+    lan::lab(&lan::specs(&addresses), mtu)
 }
 
 fn socket(lab: &Lab, node: &str, address: &str) -> UdpSocket {

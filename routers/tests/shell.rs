@@ -11,12 +11,13 @@ use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::{Kind, Label, Name, Options, Receiver, SendError, Shape, Type, local};
 use rohrpost_network::Security;
 use rohrpost_routers::counts::Cause;
-use rohrpost_routers::frame::{FrameHead, FrameKind, HEAD_BYTES};
+use rohrpost_routers::frame::{FrameHead, FrameKind};
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
 use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::security::Port;
 use rohrpost_routers::shell::{Shell, listen};
 use rohrpost_routers::stats::Stats;
+use rohrpost_testbed::lan::alive;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
@@ -141,8 +142,7 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
     let [foreign, dropped] = [|stats: &Stats| stats.foreign.get(), |stats: &Stats| stats.dropped.get()];
     let [foreign, dropped] = [foreign, dropped].map(|count| move || count(here.shell().stats()));
     let head = FrameHead { kind: FrameKind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation: 99, sequence: 0 };
-    let told = [0; 24];
-    let claims = [&head.to_bytes(&[&told])[..HEAD_BYTES], &told].concat();
+    let claims = alive(head);
     until("the peer is heard", || here.shell().stats().peer(1).link.incarnation.get() == 2);
     let before = (foreign(), dropped());
     let stranger = UdpSocket::bind((IpAddr::V4(Ipv4Addr::new(127, 127, 127, 127)), 0)).unwrap();
@@ -160,7 +160,7 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
     // From the node's address, but of another system.
     let own = UdpSocket::bind((here.settings.nodes[1].address, 0)).unwrap();
     let head = FrameHead { system: 2, ..head };
-    own.send_to(&[&head.to_bytes(&[&told])[..], &told].concat(), to).unwrap();
+    own.send_to(&alive(head), to).unwrap();
     until("it is counted", || refused(1) == 1);
 }
 
@@ -255,17 +255,10 @@ fn what_waited_for_a_router_for_long_says_nothing_of_the_present_incarnation() {
     pair.sides[1].sockets = listen(here, (at.port(), [None, None]), &[there]);
     let peer = UdpSocket::bind((there, 0)).unwrap();
     let says = |sequence: u32| {
-        let (incarnation, told) = (99, [0; 24]);
-        let head = FrameHead {
-            kind: FrameKind::Alive,
-            system: 1,
-            from: 0,
-            to: 1,
-            digest: 7,
-            incarnation,
-            sequence: sequence.into(),
-        };
-        peer.send_to(&[&head.to_bytes(&[&told])[..], &told].concat(), at).unwrap();
+        let sequence = sequence.into();
+        let head =
+            FrameHead { kind: FrameKind::Alive, system: 1, from: 0, to: 1, digest: 7, incarnation: 99, sequence };
+        peer.send_to(&alive(head), at).unwrap();
     };
     says(0);
     std::thread::sleep(Duration::from_nanos(SOCKET_MAX_NS) + Duration::from_millis(100));

@@ -15,8 +15,8 @@ use nix::sys::signal::{Signal, raise};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 use rohrpost_mailbox::Shape;
+use rohrpost_testbed::lan::role as role_of_process;
 use std::collections::BTreeMap;
-use std::process::{Command, Stdio};
 use std::time::Instant;
 
 const PACKAGES: u64 = 200;
@@ -141,9 +141,7 @@ fn call_name(number: libc::c_long, arguments: [u64; 6]) -> String {
 
 #[test]
 fn a_package_costs_one_call_to_send_one_to_receive_and_those_to_sleep_and_wake() {
-    let mut child = Command::new(std::env::current_exe().unwrap());
-    child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, "1");
-    let child = child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    let child = role_of_process("role", ROLE, "1").spawn().unwrap();
     let Traced { calls, seconds } = trace();
     drop(child);
     let others = OTHERS_ALWAYS + (OTHERS_PER_SECOND * seconds) as u64;

@@ -155,9 +155,9 @@ fn all_talk(segment: &Segment, listeners: &mut Listeners) -> Result<(), Late> {
     let since_ns = monotonic_ns();
     let mut talkers = talkers(segment, &ALL);
     listeners.acquaint(&mut talkers);
-    listeners.say_all(&mut talkers, ROUNDS);
+    listeners.say_all(&mut talkers, 0..ROUNDS);
     let replaced = || ALL.into_iter().find_map(|node| segment.replaced(node, since_ns));
-    listeners.hear_all_unless(segment, &ALL, &(0..ROUNDS).collect::<Vec<_>>(), || replaced().is_some());
+    listeners.hear_all_unless(segment, &ALL, 0..ROUNDS, || replaced().is_some());
     replaced().map_or(Ok(()), Err)
 }
 

@@ -43,7 +43,7 @@ fn a_slave_with_a_drifting_clock_keeps_its_slots() {
     stations[2].skew.rate_ppb = DRIFT_PPB;
     stations[2].skew.wander_ppb = SWING_PPB;
     stations.iter_mut().for_each(|station| station.start(lab));
-    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    segment.wait_until_all_send();
     let (mut listeners, began) = (Listeners::new(&segment), Instant::now());
     let capture = Capture::start(&segment.lab);
     let off_ppb = || (segment.stations[2].clock().rate_ppb.abs() - DRIFT_PPB).abs();
@@ -78,7 +78,7 @@ fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_an
     stations[2].shell = None;
     stations[2].late = None;
     stations[2].start(lab);
-    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    segment.wait_until_all_send();
     talk(&segment, &mut listeners, &ALL, 50);
 }
 
@@ -87,10 +87,10 @@ fn behind_a_bridge_that_becomes_slow_a_node_keeps_its_slots_and_loses_nothing() 
     unless_stalled(|_| {
         let Some(segment) = Segment::start() else { return Ok(()) };
         let mut listeners = Listeners::new(&segment);
-        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+        segment.wait_until_all_send();
         segment.wait_until("node 2 knows its rate", |segment| knows_its_rate(&segment.stations[2]));
         goes_on_behind_a_slow_bridge(&segment, &mut listeners)?;
-        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+        segment.wait_until_all_send();
         talk(&segment, &mut listeners, &ALL, 50);
         Ok(())
     });
@@ -104,11 +104,11 @@ fn goes_on_behind_a_slow_bridge(segment: &Segment, listeners: &mut Listeners) ->
     listeners.acquaint(&mut talkers);
     let capture = Capture::start(&segment.lab);
     let relay = Relay::start(segment, 2, HELD_BACK, |_| false);
-    listeners.say_all(&mut talkers, ROUNDS);
+    listeners.say_all(&mut talkers, 0..ROUNDS);
     let silent = segment.stations[2].slots().silent;
     let replaced = || ALL.into_iter().find_map(|node| segment.replaced(node, since_ns));
     // What the relay holds when it ends is lost.
-    listeners.hear_all_unless(segment, &ALL, &(0..ROUNDS).collect::<Vec<_>>(), || replaced().is_some());
+    listeners.hear_all_unless(segment, &ALL, 0..ROUNDS, || replaced().is_some());
     assert!(relay.end() > 300, "data and time take that way");
     let crossed = capture.end();
     if let Some(late) = replaced() {
@@ -129,7 +129,7 @@ fn a_master_with_arriving_packages_is_not_replaced_for_missing_syncs() {
 
 /// The master stays one while it speaks, and its Syncs do not reach the backup.
 fn stays_master_without_syncs(segment: &Segment) -> Result<(), Late> {
-    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    segment.wait_until_all_send();
     let heard_of = || segment.stations[2].clock().master;
     segment.wait_until("there is a master", |_| heard_of().is_some());
     let since_ns = monotonic_ns();
@@ -173,7 +173,7 @@ fn shape(segment: &Segment, node: u8, words: &str) -> bool {
 #[test]
 fn what_a_device_does_not_take_is_counted_and_nobody_waits_for_it() {
     let Some(segment) = Segment::start() else { return };
-    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    segment.wait_until_all_send();
     // A thousandth of what `link` says.
     if !shape(&segment, 2, "qdisc add dev lan root tbf rate 1mbit burst 1600 limit 10000000") {
         return report::skipped("a device that is too slow (`tc` with tbf)");

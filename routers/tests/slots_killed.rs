@@ -9,7 +9,7 @@ mod common;
 use common::hog::{Hog, be_a_hog};
 use common::kept::assert_kept;
 use common::process::{Router, be_a_router};
-use common::talk::{Listeners, PAUSE, Talker, talkers};
+use common::talk::{Listeners, talkers};
 use common::{Capture, MASTERS, Segment};
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::monotonic_ns;
@@ -88,27 +88,18 @@ impl Scene {
         });
     }
 
-    /// So many rounds of packages.
-    fn talk(&mut self, talkers: &mut [Talker], numbers: std::ops::Range<u16>) {
-        for id in numbers {
-            talkers.iter_mut().for_each(|talker| talker.say(id));
-            self.listeners.listen();
-            std::thread::sleep(PAUSE);
-        }
-    }
-
     /// Something happens to the master; nodes that live throughout lose nothing, and send in their slots alone.
     fn round(&mut self, what: &str, happens: impl FnOnce(&mut Self, u8), ends: impl FnOnce(&mut Self, u8)) {
         let master = self.master();
         let others = [MASTERS[0] + MASTERS[1] - master, WITNESS];
         let capture = Capture::start(&self.segment.lab);
         let mut mouths_of_others = talkers(&self.segment, &others);
-        self.talk(&mut mouths_of_others, 0..20);
+        self.listeners.say_all(&mut mouths_of_others, 0..20);
         happens(self, master);
-        self.talk(&mut mouths_of_others, 20..120);
+        self.listeners.say_all(&mut mouths_of_others, 20..120);
         ends(self, master);
-        self.talk(&mut mouths_of_others, 120..160);
-        self.listeners.hear_all(&self.segment, &others, &(0..160).collect::<Vec<_>>());
+        self.listeners.say_all(&mut mouths_of_others, 120..160);
+        self.listeners.hear_all(&self.segment, &others, 0..160);
         assert_kept(what, &self.segment, WITNESS, &capture.end());
     }
 
@@ -118,8 +109,8 @@ impl Scene {
         let all = [MASTERS[0], MASTERS[1], WITNESS];
         let mut talkers = talkers(&self.segment, &all);
         self.listeners.acquaint(&mut talkers);
-        self.talk(&mut talkers, 0..20);
-        self.listeners.hear_all(&self.segment, &all, &(0..20).collect::<Vec<_>>());
+        self.listeners.say_all(&mut talkers, 0..20);
+        self.listeners.hear_all(&self.segment, &all, 0..20);
     }
 }
 

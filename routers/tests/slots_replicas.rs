@@ -61,7 +61,7 @@ fn replicate(segment: &mut Segment) -> (Writing, [Reading; 2]) {
         let parts = ReplicaParts { replicas: &replicas, describe: Arc::new(Always), socket: None, impair };
         station.shell.as_mut().unwrap().replicate(&station.node, parts).unwrap();
     }
-    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    segment.wait_until_all_send();
     join(&segment.stations[0]).describe_replicas(module(0), b"of a camera").unwrap();
     let writer = join(&segment.stations[0]).stream_writer(id(), SHAPE).unwrap();
     let reading = |node: usize| {

@@ -6,7 +6,7 @@
 mod common;
 
 use common::kept::{assert_inside, assert_kept, validate};
-use common::talk::{Listeners, PAUSE, talkers};
+use common::talk::{Listeners, talkers};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment};
 use rohrpost_routers::frame::FrameKind;
 use rohrpost_routers::time::Role;
@@ -17,17 +17,13 @@ const ROUNDS: u16 = 150;
 #[test]
 fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
     let Some(mut segment) = Segment::start() else { return };
-    segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
+    segment.wait_until_all_send();
     let all: Vec<u8> = (0..NODES).collect();
     let (mut listeners, mut mouths_of_all) = (Listeners::new(&segment), talkers(&segment, &all));
     listeners.acquaint(&mut mouths_of_all);
     let capture = Capture::start(&segment.lab);
-    for id in 0..ROUNDS {
-        mouths_of_all.iter_mut().for_each(|talker| talker.say(id));
-        listeners.listen();
-        std::thread::sleep(PAUSE);
-    }
-    listeners.hear_all(&segment, &all, &(0..ROUNDS).collect::<Vec<_>>());
+    listeners.say_all(&mut mouths_of_all, 0..ROUNDS);
+    listeners.hear_all(&segment, &all, 0..ROUNDS);
     let crossed = capture.end();
     for kind in [FrameKind::Packages, FrameKind::Sync, FrameKind::Request, FrameKind::Reply] {
         assert!(crossed.iter().any(|frame| frame.kind == kind), "{kind:?} crossed the bridge");
@@ -48,15 +44,10 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
         (counts.syncs.replacements_sent, counts.late + counts.skipped + counts.synchronisations_late)
     };
     let before = left_out(&segment);
-    for id in 0..2 * ROUNDS {
-        if id == ROUNDS / 2 {
-            segment.stations[usize::from(master)].shell = None;
-        }
-        mouths_of_others.iter_mut().for_each(|talker| talker.say(id));
-        listeners.listen();
-        std::thread::sleep(PAUSE);
-    }
-    listeners.hear_all(&segment, &others, &(0..2 * ROUNDS).collect::<Vec<_>>());
+    listeners.say_all(&mut mouths_of_others, 0..ROUNDS / 2);
+    segment.stations[usize::from(master)].shell = None;
+    listeners.say_all(&mut mouths_of_others, ROUNDS / 2..2 * ROUNDS);
+    listeners.hear_all(&segment, &others, 0..2 * ROUNDS);
     segment.wait_until("the next is the master", |segment| {
         segment.stations[usize::from(next)].clock().role == Role::Master
     });
@@ -75,17 +66,16 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
     // It comes back, listens, and speaks again.
     let Segment { stations, lab, .. } = &mut segment;
     stations[usize::from(master)].start(lab);
-    segment.wait_until("all send again", |segment| segment.stations.iter().all(common::Station::is_ready));
+    segment.wait_until_all_send();
     listeners.acquaint(&mut mouths_of_all);
-    let numbers: Vec<_> = (0..20).collect();
-    numbers.iter().for_each(|id| mouths_of_all.iter_mut().for_each(|talker| talker.say(*id)));
-    listeners.hear_all(&segment, &all, &numbers);
+    listeners.say_all(&mut mouths_of_all, 0..20);
+    listeners.hear_all(&segment, &all, 0..20);
 }
 
 #[test]
 fn a_refusal_waits_for_a_slot() {
     let Some(mut segment) = Segment::start() else { return };
-    segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
+    segment.wait_until_all_send();
     segment.stations[2].shell = None;
     let capture = Capture::start(&segment.lab);
     // In the place of node 2 there is now a sender with another configuration, which ignores slots.

@@ -10,7 +10,7 @@
 mod common;
 
 use common::declared::{flows_keep_their_bounds, segment};
-use common::{PATIENCE, Segment, Station};
+use common::{PATIENCE, Segment};
 use rohrpost_network::Tunnel;
 use rohrpost_testbed::report;
 use rohrpost_testbed::stalls::unless_stalled;
@@ -93,7 +93,7 @@ fn somebody_types_and_copies_a_file_and_declared_flows_keep_their_bounds() {
             report::skipped("TUN devices");
             return Ok(());
         }
-        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+        segment.wait_until_all_send();
         let (near, far) = connection(&segment, FILE_PORT);
         let copied = std::sync::Arc::new(AtomicBool::new(false));
         let typed = {

@@ -11,10 +11,10 @@ use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_mailbox::{Name, Node, Receiver, Sender, Shape, local, monotonic_ns};
 use rohrpost_network::Tdma;
 use rohrpost_routers::tdma::SlotTable;
+use rohrpost_testbed::lan::{self, Killed};
 use rohrpost_testbed::stalls::{Late, unless_stalled};
 use std::net::IpAddr;
 use std::panic::resume_unwind;
-use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 const ROLE: &str = "ROHRPOST_TEST_ROUTER";
@@ -53,21 +53,10 @@ fn role() {
     }
 }
 
-struct Killed(Child);
-
-impl Drop for Killed {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 fn start(side: &Side, incarnation: u16) -> Killed {
     let [first, second] = [0, 1].map(|node: usize| side.settings.nodes[node].address);
     let said = format!("{} {first} {second} {}", side.node.path().display(), 1000 + u64::from(incarnation));
-    let mut child = Command::new(std::env::current_exe().unwrap());
-    child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, said);
-    Killed(child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap())
+    Killed(lan::role("role", ROLE, &said).spawn().unwrap())
 }
 
 /// The mailbox of node 0's router.

@@ -7,21 +7,19 @@
 #[allow(dead_code, reason = "made for two nodes in one namespace; a part of it serves here")]
 mod common;
 
-use common::{PATIENCE, Side, Words, label, router};
+use common::{PATIENCE, Words, label, module, router};
 use rohrpost_mailbox::{Name, Node, Shape, monotonic_ns};
-use rohrpost_network::Route;
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_routers::lab::Lab;
 use rohrpost_routers::link::PeerLinkState;
-use rohrpost_routers::settings::{NodeSettings, Settings};
+use rohrpost_routers::settings::Settings;
 use rohrpost_routers::shell::{Parts, Shell};
-use rohrpost_testbed::report;
+use rohrpost_testbed::{lan, report};
 use std::net::IpAddr;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const NODES: [&str; 3] = ["n0", "n1", "n2"];
-const ADDRESSES: [&str; 3] = ["10.91.0.1", "10.91.0.2", "10.91.0.3"];
 /// What goes to the second node goes by a device that sends a datagram in some ten seconds.
 const STALL: [&str; 6] = [
     "ip link add slow0 type veth peer name slow1",
@@ -32,20 +30,8 @@ const STALL: [&str; 6] = [
     "ip route add 10.91.0.2/32 dev slow0",
 ];
 
-fn lab() -> Option<Lab> {
-    let specs = NODES.iter().zip(ADDRESSES);
-    let specs: Vec<_> =
-        specs.map(|(name, address)| NodeSpec { name: (*name).into(), address: address.parse().unwrap() }).collect();
-    match Lab::new(&specs, 1500) {
-        Ok(lab) => Some(lab),
-        Err(LabError::NotAllowed(error)) => skip(&format!("network namespaces ({error})")),
-        Err(error) => panic!("{error}"),
-    }
-}
-
-fn skip<T>(why: &str) -> Option<T> {
-    report::skipped(why);
-    None
+fn addresses() -> [IpAddr; 3] {
+    [1, 2, 3].map(|host| IpAddr::from([10, 91, 0, host]))
 }
 
 /// Runs in the first node; whether it could.
@@ -55,37 +41,17 @@ fn run(lab: &Lab, line: &str) -> bool {
     lab.command(NODES[0], command.args(words)).is_ok_and(|mut child| child.wait().is_ok_and(|ended| ended.success()))
 }
 
-fn module(node: u8) -> Name {
-    common::module(node)
-}
-
-fn settings(own: u8, real_time_from: u16) -> Settings {
-    let folder = tempfile::tempdir().unwrap();
-    let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
-    let addresses = [0, 1].map(|node: usize| ADDRESSES[node].parse::<IpAddr>().unwrap());
-    let others = (0..3).filter(|node| *node != own);
-    let address = |node: usize| ADDRESSES[node].parse().unwrap();
-    Settings {
-        own,
-        nodes: (0..3).map(|node| NodeSettings { name: NODES[node].into(), address: address(node) }).collect(),
-        routes: others.map(|node| Route { first: module(node), last: module(node).with_local(255), node }).collect(),
-        hosts: [module(own), router(own)].map(|name| (name, name.with_local(u8::MAX))).into(),
-        flows: Vec::new(),
-        real_time_from,
-        ..Side::new(own.min(1), node, addresses, None).settings
-    }
-}
-
 #[test]
 fn a_way_that_stands_still_keeps_nobody_else_waiting() {
     // The module's class is 100.
     for real_time_from in [0, 128] {
-        let Some(lab) = lab() else { return };
+        let Some(lab) = lan::lab(&lan::specs(&addresses()), 1500) else { return };
         let folder = tempfile::Builder::new().prefix("rohrpost-stalled-").tempdir_in("/dev/shm").unwrap();
         let nodes = NODES.map(|name| Node::create(&folder.path().join(name), 0o700).unwrap());
         let start = |own: usize| {
             let _inside = lab.enter(NODES[own]).unwrap();
-            let (settings, faults) = (settings(own as u8, real_time_from), Arc::new(Words));
+            let faults = Arc::new(Words);
+            let settings = Settings { real_time_from, ..lan::settings(own as u8, &addresses(), None) };
             let (name, node) = (router(own as u8), &nodes[own]);
             Shell::start(Parts { node, name, settings, faults, sockets: Vec::new(), impair: None, clock: None })
                 .unwrap()
@@ -114,7 +80,7 @@ fn a_way_that_stands_still_keeps_nobody_else_waiting() {
         };
         [0, 1].into_iter().for_each(&mut goes);
         if !STALL.iter().all(|line| run(&lab, line)) {
-            return skip("no `ip` and `tc` with tbf").unwrap_or_default();
+            return report::skipped("no `ip` and `tc` with tbf");
         }
         let began = Instant::now();
         let mut flood = join(0).sender(module(1)).unwrap();

@@ -10,9 +10,7 @@
 //! sends in windows.
 
 use super::cpu_budget::CpuBudget;
-use super::time_platform::{
-    TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeSource,
-};
+use super::time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeEvent, TimeInput, TimePlatform, TimeSource};
 use crate::frame::{BadFrame, FrameHead, NodeIndex};
 use crate::security::{NotOpened, Opened, Opening, PeerSessions, Port, Rejection, Sealing, Tally};
 use crate::time::{Clock, InSlots, Looked, SentId, Stamp, Step, TIME_BYTES, TimeSettings, Unsteady};
@@ -59,7 +57,8 @@ pub struct ClockDriver {
     addresses: Box<[IpAddr]>,
     seals: Option<Seals>,
     written: Option<TimeRecord>,
-    counts: TimeCounts,
+    /// Datagrams that were not taken.
+    ignored: u64,
     share: CpuBudget,
     /// An address that no node has, which tells the time of another configuration.
     stranger: Option<IpAddr>,
@@ -86,8 +85,8 @@ impl ClockDriver {
         let mut clock = Clock::new(settings, now_ns, realtime_ns, page).watching(now_ns, watched);
         let was_steady = clock.unsteady(now_ns).is_none();
         let unsteady = clock.look_at_clocks(looked).filter(|_| was_steady);
-        let (counts, share) = (TimeCounts::default(), CpuBudget::new(monotonic_ns));
-        let driver = Self { clock, system, addresses, seals: None, written: page, counts, share, stranger: None };
+        let share = CpuBudget::new(monotonic_ns);
+        let driver = Self { clock, system, addresses, seals: None, written: page, ignored: 0, share, stranger: None };
         (driver, unsteady)
     }
 
@@ -188,7 +187,7 @@ impl ClockDriver {
             self.clock.begin_time(on.local_ns(), wall_ns);
         }
         self.write_page(on);
-        on.publish(&self.clock, self.counts);
+        on.publish(&self.clock, self.ignored);
     }
 
     /// Before anything is measured by it: whether the local clock is one to measure by.
@@ -231,16 +230,12 @@ impl ClockDriver {
         } else {
             (TimeSource::Unproven, Some(clock.overhear(now_ns, came.stamp, &head, rest)))
         };
-        self.counts.ignored += u64::from(taken != Some(Ok(())));
+        self.ignored += u64::from(taken != Some(Ok(())));
         on.happened(clock, TimeEvent::Heard { source, head: &head, rest, taken });
-        if let Some(exchange) = clock.take_exchange() {
-            (self.counts.exchanges, self.counts.by_kernel) = (self.counts.exchanges + 1, exchange.by_kernel);
-            on.happened(clock, TimeEvent::Measured(&exchange));
-        }
     }
 
     fn ignore(&mut self, on: &mut impl TimePlatform, event: TimeEvent<'_>) {
-        self.counts.ignored += 1;
+        self.ignored += 1;
         on.happened(&self.clock, event);
     }
 

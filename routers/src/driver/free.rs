@@ -19,19 +19,13 @@ const BURST: usize = 64;
 /// The router's mailbox, and where packages go from there.
 pub trait Inlet {
     /// Clock, queue and sockets.
-    type Outlet: RealTimeOutlet;
+    type Outlet: Outlet;
     /// The same, without a package.
     fn outlet(&mut self) -> &mut Self::Outlet;
     /// How important the first package is; none: there is none.
     fn first(&mut self) -> Option<Priority>;
     /// Lends out the most important package, with what looks whether it is alone in the mailbox. None: there is none.
     fn take<T>(&mut self, what: impl FnOnce(&mut Self::Outlet, &Package<'_>, &dyn Fn() -> bool) -> T) -> Option<T>;
-}
-
-/// An outlet beside which there may be another, for what is not real time.
-pub trait RealTimeOutlet: Outlet {
-    /// To the thread that sends what is not real time; none where there is none.
-    fn rest(&mut self) -> Option<&mut impl Handover>;
 }
 
 /// The way to the thread that sends what is not real time.
@@ -46,31 +40,6 @@ pub trait Handover {
     fn has_room(&self) -> bool;
     /// From now on this thread is woken when it may take again.
     fn wants_room(&self);
-}
-
-/// There is no such thread.
-pub enum Nowhere {}
-
-impl Handover for Nowhere {
-    fn takes(&mut self) -> bool {
-        match *self {}
-    }
-
-    fn give(&mut self, _: &Head, _: u64, _: &[u8]) {
-        match *self {}
-    }
-
-    fn finish(&mut self) {
-        match *self {}
-    }
-
-    fn has_room(&self) -> bool {
-        match *self {}
-    }
-
-    fn wants_room(&self) {
-        match *self {}
-    }
 }
 
 /// What to do until it is polled again.
@@ -177,7 +146,7 @@ impl FreeDriver {
     }
 
     /// What ends a sleep with an empty mailbox, or with one that has only what is not real time.
-    fn wakes(&self, outlet: &mut impl RealTimeOutlet) -> Wakes {
+    fn wakes(&self, outlet: &mut impl Outlet) -> Wakes {
         let Some(rest) = outlet.rest().filter(|rest| !rest.has_room()) else { return Wakes::Any };
         rest.wants_room();
         Wakes::AboveOrRoom(Priority(self.settings.real_time_from.saturating_sub(1).try_into().unwrap_or(u8::MAX)))
@@ -185,7 +154,7 @@ impl FreeDriver {
 }
 
 /// Hands over what is not real time, where there is a thread for it.
-fn give_to_rest(outlet: &mut impl RealTimeOutlet, package: &Package<'_>) -> bool {
+fn give_to_rest(outlet: &mut impl Outlet, package: &Package<'_>) -> bool {
     let Some(rest) = outlet.rest() else { return false };
     if rest.takes() {
         rest.give(&package.head, package.published_ns, package.body);

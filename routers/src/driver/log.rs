@@ -18,8 +18,6 @@ pub struct Used {
     pub by_kernel: bool,
     /// Datagrams.
     pub datagrams: u64,
-    /// Their bytes on the wire, all heads counted.
-    pub wire_bytes: u64,
     /// The last one was decided on when it would still be off the wire so long before the end, ns. Never less than 0.
     pub spare_ns: i64,
     /// The call for the last one came back so long after the end, ns; 0: not after it.
@@ -55,7 +53,6 @@ impl WindowLog {
             off_ns: first_ns.wrapping_sub(tx_window.begin_ns).cast_signed(),
             by_kernel: false,
             datagrams: tx_window.datagrams(),
-            wire_bytes: tx_window.wire_bytes(),
             spare_ns: tx_window.spare_ns(),
             over_ns,
         });
@@ -73,15 +70,12 @@ impl WindowLog {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::harness::tdma;
     use crate::tdma::{Carries, WindowKind, Wire};
-    use rohrpost_network::Tdma;
-    use std::time::Duration;
 
     #[test]
     fn a_window_that_was_over_when_its_last_call_came_back_is_counted() {
-        let (cycle, part) = (Duration::from_millis(10), Duration::from_millis(1));
-        let link_bytes_s = 125_000_000;
-        let tdma = Tdma { cycle, synchronisation: part, guard: part, link_bytes_s, slots: Vec::new(), tunnel: None };
+        let tdma = tdma([10_000, 1000, 1000], Vec::new());
         let wire = Wire::new(&tdma, 28);
         let window = Window { kind: WindowKind::Slot { index: 0 }, cycle: 0, begin_ns: 1_000_000, end_ns: 2_000_000 };
         let mut log = WindowLog::default();

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! [`SlotDriver`] sends in time slots, parts of replicas too. Without them [`FreeDriver`] sends what is real time,
-//! [`RestDriver`] the rest, and [`ReplicaDriver`] parts of replicas. [`RxDriver`] receives, and [`ClockDriver`] keeps
-//! time.
+//! and [`ReplicaDriver`] parts of replicas; a thread of the shell sends the rest. [`RxDriver`] receives, and
+//! [`ClockDriver`] keeps time.
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 
@@ -23,7 +23,6 @@ mod outlet;
 mod parts;
 mod platform;
 mod replicas;
-mod rest;
 mod rx;
 mod slots;
 #[cfg(test)]
@@ -33,15 +32,15 @@ mod timing;
 
 pub use answer::{ANSWER_BYTES, ANSWERS, Answer};
 pub use clock::{ClockDriver, ClockStep, TimeStart};
-pub use free::{FreeDriver, FreeStep, Handover, Inlet, Nowhere, RealTimeOutlet, Wakes};
+pub use free::{FreeDriver, FreeStep, Handover, Inlet, Wakes};
 pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};
-pub use outlet::Outlet;
+pub(crate) use outlet::Transmitter;
+pub use outlet::{Outlet, OutletStep};
 pub use parts::part_for_slot;
 pub use platform::{NotSent, Platform, SlotEvent};
-pub use replicas::{ReplicaDriver, ReplicaWait, part_queue};
-pub use rest::{RestDriver, RestInlet, RestStep};
+pub use replicas::{ReplicaDriver, part_queue};
 pub use rx::{RxDriver, RxPlatform};
 pub use slots::SlotDriver;
-pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeSource};
+pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeEvent, TimeInput, TimePlatform, TimeSource};
 pub use timing::{SlotStep, spin_ns};

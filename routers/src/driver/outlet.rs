@@ -1,5 +1,6 @@
 //! What a thread that sends as packages come has of the system behind its queue, and what it does with that.
 
+use super::free::Handover;
 use super::platform::NotSent;
 use crate::frame::NodeIndex;
 use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, OutboundStep, Package};
@@ -32,22 +33,43 @@ pub trait Outlet {
     fn blocked(&self) -> (u64, u64);
     /// Sends what an impairment delayed for long enough; when it has more, ns.
     fn deliver(&mut self, now_ns: u64) -> u64;
+    /// The way to the thread that sends what is not real time; none where there is none.
+    fn rest(&mut self) -> Option<&mut dyn Handover> {
+        None
+    }
+}
+
+/// What a thread below real time does until its driver is polled again.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum OutletStep {
+    /// Poll it at once.
+    Again,
+    /// The rate limit holds the wire: sleep.
+    Sleep {
+        /// For so long, ns.
+        for_ns: u64,
+    },
+    /// Wait for packages or records.
+    Wait {
+        /// For so long, ns.
+        for_ns: u64,
+    },
 }
 
 /// Takes packages, and sends what the queue lets go.
-pub(super) struct Transmitter {
+pub(crate) struct Transmitter {
     /// Room for the largest datagram, and its seal.
     datagram: Box<[u8]>,
 }
 
 impl Transmitter {
-    pub(super) fn new(settings: &Settings) -> Self {
+    pub(crate) fn new(settings: &Settings) -> Self {
         let bytes = settings.network.datagram_bytes_max + settings.network.security.tag_bytes();
         Self { datagram: vec![0; bytes].into() }
     }
 
     /// Takes a package: sends or queues it. `alone`: see [`Outbound::accept`].
-    pub(super) fn accept(&mut self, on: &mut impl Outlet, package: &Package<'_>, alone: bool) {
+    pub(crate) fn accept(&mut self, on: &mut impl Outlet, package: &Package<'_>, alone: bool) {
         let (now_ns, body) = (on.monotonic_ns(), package.body);
         let (outbound, mut report) = on.queue();
         let Accepted::Send { to, head } = outbound.accept(now_ns, package, alone, &mut report) else { return };
@@ -65,7 +87,7 @@ impl Transmitter {
     }
 
     /// Sends the next datagram; else returns when there is one, unless a package comes.
-    pub(super) fn step(&mut self, on: &mut impl Outlet, now_ns: u64) -> Option<u64> {
+    pub(crate) fn step(&mut self, on: &mut impl Outlet, now_ns: u64) -> Option<u64> {
         on.retry(now_ns);
         pass_over_blocked(on);
         let (outbound, mut report) = on.queue();

@@ -1,6 +1,6 @@
 //! Sends parts of replicas, behind all packages: what leaves next, and for how long to wait.
 
-use super::outlet::{Outlet, Transmitter};
+use super::outlet::{Outlet, OutletStep, Transmitter};
 use crate::outbound::Outbound;
 use crate::replication::{ReplicaSender, ReplicaStep};
 use crate::security::PeerSessions;
@@ -13,23 +13,6 @@ use std::sync::Arc;
 const LOOK_NS: u64 = 100_000_000;
 /// Room in a socket is looked at this often at the least, ns.
 const LOOK_AGAIN_NS: u64 = 10_000_000;
-
-/// What to do until it is polled again.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum ReplicaWait {
-    /// Poll it at once.
-    Again,
-    /// The wire has no room: sleep.
-    Sleep {
-        /// For so long, ns.
-        for_ns: u64,
-    },
-    /// Wait for records.
-    Wait {
-        /// For so long, ns.
-        for_ns: u64,
-    },
-}
 
 /// The queue by which parts of replicas leave, and count in `stats`. No package waits in it, so it needs no room for
 /// those of modules; the wire it leaves to those of `before`, of which the first is the real-time half.
@@ -68,16 +51,16 @@ impl ReplicaDriver {
         on: &mut impl Outlet,
         system: impl Fn(u64) -> SystemTime,
         sender: &mut ReplicaSender,
-    ) -> ReplicaWait {
+    ) -> OutletStep {
         let now_ns = on.monotonic_ns();
         // Keep-alives; packages do not come here.
-        let Some(until_ns) = self.transmitter.step(on, now_ns) else { return ReplicaWait::Again };
+        let Some(until_ns) = self.transmitter.step(on, now_ns) else { return OutletStep::Again };
         let until_ns = until_ns.min(on.deliver(now_ns));
         let left_ns = |other_ns: u64| until_ns.min(other_ns).saturating_sub(now_ns);
         match self.transmitter.step_replicas(on, now_ns, system, sender) {
-            ReplicaStep::Send { .. } => ReplicaWait::Again,
-            ReplicaStep::Wait { until_ns } => ReplicaWait::Sleep { for_ns: left_ns(until_ns).min(LOOK_AGAIN_NS) },
-            ReplicaStep::Idle { until_ns } => ReplicaWait::Wait { for_ns: left_ns(until_ns).min(LOOK_NS) },
+            ReplicaStep::Send { .. } => OutletStep::Again,
+            ReplicaStep::Wait { until_ns } => OutletStep::Sleep { for_ns: left_ns(until_ns).min(LOOK_AGAIN_NS) },
+            ReplicaStep::Idle { until_ns } => OutletStep::Wait { for_ns: left_ns(until_ns).min(LOOK_NS) },
         }
     }
 }

@@ -4,7 +4,7 @@ mod parts;
 
 use super::{ANSWER_BYTES, Answer, NotSent, Platform, SlotDriver, SlotEvent, SlotStep, WINDOWS, WindowLog, spin_ns};
 use crate::frame::NodeIndex;
-use crate::harness::{End, MS, S, START, address, head, module};
+use crate::harness::{End, MS, S, START, address, head, module, slot, tdma};
 use crate::intake::Transit;
 use crate::outbound::{Accepted, Outbound};
 use crate::report::Report;
@@ -13,7 +13,6 @@ use crate::tdma::{SlotScheduler, SlotTable, WindowVerdict};
 use crate::time::{Clock, SentId, Stamp, TIME_BYTES, TimeSettings};
 use parts::Replicated;
 use rohrpost_mailbox::{Head, Priority};
-use rohrpost_network::{Tdma, TimeSlot};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -190,26 +189,10 @@ struct Router {
 impl Router {
     /// Of node 0, which sends already.
     fn new() -> Self {
-        let slot = TimeSlot { node: 0, offset: CYCLE / 2, length: Duration::from_micros(1000), period: 1, phase: 0 };
-        let tdma = Tdma {
-            cycle: CYCLE,
-            synchronisation: Duration::from_micros(1000),
-            guard: Duration::from_micros(400),
-            link_bytes_s: 125_000_000,
-            slots: vec![slot],
-            tunnel: None,
-        };
+        let tdma = tdma([10_000, 1000, 400], vec![slot(0, 5000, 1000)]);
         let table = SlotTable::new(&tdma, &[0], 0, 3, 28);
         let end = End::new(0, |settings| settings.tdma = Some(tdma));
-        let clock = TimeSettings {
-            system: 1,
-            own: 0,
-            nodes: 3,
-            masters: vec![0],
-            interval: CYCLE,
-            digest: end.settings.digest,
-            incarnation: 1,
-        };
+        let clock = TimeSettings::of(&end.settings, &[0], CYCLE);
         let clock = Clock::new(clock, START, WALL_NS, None).in_slots(table.for_clock());
         let scheduler = SlotScheduler::new(table, spin_ns(CYCLE.as_nanos() as u64));
         let driver = SlotDriver::new(&Arc::new(end.settings.clone()), None, scheduler, START);

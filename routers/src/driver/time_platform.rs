@@ -3,7 +3,7 @@
 use crate::frame::FrameHead;
 use crate::frame::NodeIndex;
 use crate::security::{Rejection, TAG_BYTES};
-use crate::time::{Clock, Exchange, Ignored, Looked, SentId, Stamp, TIME_BYTES, Unsteady};
+use crate::time::{Clock, Ignored, Looked, SentId, Stamp, TIME_BYTES, Unsteady};
 use rohrpost_mailbox::{TimeRecord, Watched};
 use std::net::IpAddr;
 
@@ -32,17 +32,6 @@ pub enum TimeInput {
     Nothing,
 }
 
-/// What a clock counts.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct TimeCounts {
-    /// Exchanges so far.
-    pub exchanges: u64,
-    /// Whether all stamps of the last exchange were the kernel's.
-    pub by_kernel: bool,
-    /// Datagrams that were not taken.
-    pub ignored: u64,
-}
-
 /// Clocks, socket and page of a node.
 pub trait TimePlatform {
     /// The clock that is measured and corrected, ns.
@@ -67,8 +56,8 @@ pub trait TimePlatform {
     fn page(&self) -> Option<TimeRecord>;
     /// Notes in the page what was seen last of the clocks.
     fn note_watched(&mut self, watched: &Watched);
-    /// Lets others see how it stands; the page is written.
-    fn publish(&mut self, clock: &Clock, counts: TimeCounts);
+    /// Lets others see how it stands; the page is written. `ignored`: datagrams that were not taken.
+    fn publish(&mut self, clock: &Clock, ignored: u64);
     /// Whether a new epoch is asked for since the last look: the computer's clock at which it is to begin, ns since
     /// 1970.
     fn take_new_epoch(&mut self) -> Option<u64> {
@@ -123,8 +112,6 @@ pub enum TimeEvent<'a> {
         /// What became of it; none: it was dropped.
         taken: Option<Result<(), Ignored>>,
     },
-    /// An exchange was measured.
-    Measured(&'a Exchange),
     /// A datagram is about to be sealed and sent.
     Sends(&'a [u8; TIME_BYTES]),
     /// Its receiver has no session: it is told later what time it is.

@@ -44,11 +44,6 @@ struct FlowKey {
 }
 
 impl Order {
-    /// Nothing delivered yet.
-    pub(super) fn new() -> Self {
-        Self { groups: Box::new([Group::default(); GROUPS]) }
-    }
-
     /// Forgets all: a new incarnation of the peer.
     pub(super) fn clear(&mut self) {
         self.groups.fill(Group::default());
@@ -109,7 +104,8 @@ fn place(head: &Head) -> (FlowKey, usize) {
 }
 
 impl Default for Order {
+    /// Nothing delivered yet.
     fn default() -> Self {
-        Self::new()
+        Self { groups: Box::new([Group::default(); GROUPS]) }
     }
 }

@@ -142,7 +142,7 @@ impl PeerReceiver {
         (self.incarnation, self.began_ns, self.is_sure) = (head.incarnation, now_ns, !is_first);
         self.leap = None;
         way.peer.link.incarnation.set(head.incarnation);
-        way.peer.link.begin(now_ns);
+        way.peer.link.begin();
         way.peer.link.accept();
         true
     }
@@ -205,7 +205,7 @@ impl PeerReceiver {
         let link = &way.peer.link;
         if !self.told.heard {
             self.told = PeerNotices { heard: true, silent: false, ..self.told };
-            link.begin(now_ns);
+            link.begin();
             deliver.event(RouterEvent::Heard { peer: way.from });
         }
         link.heard_ns.set(now_ns);

@@ -184,52 +184,32 @@ struct Model {
 }
 
 impl Model {
-    fn push(&mut self, new: QueuedPackage) -> Vec<u16> {
-        let blocks = |waiting: &QueuedPackage| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
-        let of_sender = |waiting: &&QueuedPackage| waiting.sender == new.sender;
-        let used: usize = self.waiting.iter().filter(of_sender).map(blocks).sum();
-        let yielding: usize =
-            self.waiting.iter().filter(of_sender).filter(|other| other.level > new.level).map(blocks).sum();
-        if used - yielding + blocks(&new) > QUOTA / BLOCK_BYTES {
-            return vec![new.head.id];
-        }
-        let mut gone = Vec::new();
-        while self.waiting.iter().filter(of_sender).map(blocks).sum::<usize>() + blocks(&new) > QUOTA / BLOCK_BYTES {
-            let own = self.waiting.iter().enumerate().filter(|(_, waiting)| waiting.sender == new.sender);
-            let (at, _) = own.max_by_key(|(at, waiting)| (waiting.level, *at)).unwrap();
-            gone.push(self.waiting.remove(at).head.id);
-        }
-        self.waiting.push(new);
-        gone
-    }
-
-    fn pop(&mut self) -> Option<u16> {
-        Some(self.pop_first()?.head.id)
-    }
-
     fn pop_first(&mut self) -> Option<QueuedPackage> {
         let at = (0..self.waiting.len()).min_by_key(|at| (self.waiting[*at].level, *at))?;
         Some(self.waiting.remove(at))
     }
 
-    /// Pushes a package of one sender; returns what was displaced, by `first`.
-    fn push_newest(&mut self, new: QueuedPackage) -> Vec<u64> {
+    /// Pushes a package; returns what was displaced for it, or itself.
+    fn push(&mut self, new: QueuedPackage) -> Vec<QueuedPackage> {
         let blocks = |waiting: &QueuedPackage| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
-        let state = |waiting: &QueuedPackage| (waiting.level, waiting.head.id);
-        let older = self.waiting.iter().position(|old| counts_newest(&new.head) && state(old) == state(&new));
+        let is_its_own = |waiting: &&QueuedPackage| waiting.sender == new.sender;
+        let used = |all: &[QueuedPackage]| all.iter().filter(is_its_own).map(blocks).sum::<usize>();
+        let is_older =
+            |old: &QueuedPackage| counts_newest(&new.head) && (old.level, old.head.id) == (new.level, new.head.id);
+        let older = self.waiting.iter().find(|old| is_older(old));
+        let more = older.map_or(blocks(&new), |older| blocks(&new).saturating_sub(blocks(older)));
         let yields = |waiting: &&QueuedPackage| waiting.level > new.level;
-        let used: usize = self.waiting.iter().map(blocks).sum();
-        let kept = used - self.waiting.iter().filter(yields).map(blocks).sum::<usize>();
-        let more = older.map_or(blocks(&new), |at| blocks(&new).saturating_sub(blocks(&self.waiting[at])));
-        if kept + more > QUOTA / BLOCK_BYTES {
-            return vec![new.first];
+        let yielding: usize = self.waiting.iter().filter(is_its_own).filter(yields).map(blocks).sum();
+        if used(&self.waiting) - yielding + more > QUOTA / BLOCK_BYTES {
+            return vec![new];
         }
         let mut gone = Vec::new();
-        while self.waiting.iter().map(blocks).sum::<usize>() + more > QUOTA / BLOCK_BYTES {
-            let (at, _) = self.waiting.iter().enumerate().max_by_key(|(at, waiting)| (waiting.level, *at)).unwrap();
-            gone.push(self.waiting.remove(at).first);
+        while used(&self.waiting) + more > QUOTA / BLOCK_BYTES {
+            let own = self.waiting.iter().enumerate().filter(|(_, waiting)| is_its_own(waiting));
+            let (at, _) = own.max_by_key(|(at, waiting)| (waiting.level, *at)).unwrap();
+            gone.push(self.waiting.remove(at));
         }
-        match self.waiting.iter_mut().find(|old| counts_newest(&new.head) && state(old) == state(&new)) {
+        match self.waiting.iter_mut().find(|old| is_older(old)) {
             Some(old) => *old = new,
             None => self.waiting.push(new),
         }
@@ -246,13 +226,14 @@ proptest! {
         for (id, (sender, level, len, take)) in steps.into_iter().enumerate() {
             let id = id as u16;
             let gone = push(&mut queue, id, sender, level, len);
-            prop_assert_eq!(gone, model.push(waiting(id, sender, id as u8 % 3, level, len)));
+            let displaced = model.push(waiting(id, sender, id as u8 % 3, level, len));
+            prop_assert!(displaced.iter().map(|waiting| waiting.head.id).eq(gone));
             if take {
                 let first = queue.first().map(|place| queue.remove(place).0.head.id);
-                prop_assert_eq!(first, model.pop());
+                prop_assert_eq!(first, model.pop_first().map(|waiting| waiting.head.id));
             }
         }
-        let rest: Vec<u16> = std::iter::from_fn(|| model.pop()).collect();
+        let rest: Vec<u16> = std::iter::from_fn(|| model.pop_first()).map(|waiting| waiting.head.id).collect();
         prop_assert_eq!(drain(&mut queue), rest);
         prop_assert_eq!(queue.used_bytes(), 0);
     }
@@ -281,7 +262,7 @@ proptest! {
                 None => queue.push(new, &body, tell),
             };
             gone.extend((!taken).then_some(tag as u64));
-            prop_assert_eq!(gone, model.push_newest(new));
+            prop_assert!(model.push(new).iter().map(|waiting| waiting.first).eq(gone));
             if take && let Some(place) = queue.first() {
                 let QueuedPackage { head, first, .. } = *queue.at(place);
                 let mut body = vec![0; head.len.into()];

@@ -129,9 +129,9 @@ impl ErrorReplier {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::harness::{module, settings};
+    use crate::harness::{TestNode, module, settings};
     use crate::stats::YOUNG_NS;
-    use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
+    use rohrpost_mailbox::{Name, Receiver, Shape, local};
 
     /// Writes the cause's word.
     struct Words;
@@ -148,16 +148,14 @@ mod tests {
         answers: ErrorReplier,
         replies: Receiver,
         transit: Receiver,
-        _folder: tempfile::TempDir,
+        _node: TestNode,
     }
 
     impl Fixture {
         fn new(age_ns: Option<u64>) -> Self {
-            let folder = tempfile::tempdir().unwrap();
-            let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
-            let participant = Participant::join(&node, Name::NONE).unwrap();
-            let replies = participant.receiver(caller(), Shape { slots: 4, ..Shape::default() }).unwrap();
-            let transit = participant.receiver(transit(), Shape { slots: 4, ..Shape::default() }).unwrap();
+            let node = TestNode::new();
+            let bytes_max = Shape::default().body_bytes_max;
+            let [replies, transit] = [caller(), transit()].map(|name| node.mailbox(name, 4, bytes_max));
             let settings = Arc::new(settings(0, 2));
             // A beginning that never is over.
             let started_ns = age_ns.map_or(u64::MAX, |age_ns| monotonic_ns() - age_ns);
@@ -166,10 +164,10 @@ mod tests {
                 &settings,
                 &Stats::new(&settings, started_ns),
                 &faults,
-                &participant,
+                &node.join(),
                 self::transit(),
             );
-            Self { answers, replies, transit, _folder: folder }
+            Self { answers, replies, transit, _node: node }
         }
 
         fn answered(&mut self) -> Option<String> {

@@ -168,14 +168,13 @@ impl BatchReceiver {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost_mailbox::{Name, Node, Participant, Priority, Type};
+    use crate::harness::TestNode;
+    use rohrpost_mailbox::{Name, Priority, Type};
 
-    fn ends() -> (tempfile::TempDir, BatchSender, BatchReceiver) {
-        let folder = tempfile::tempdir().unwrap();
-        let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
-        let shared = Arc::new(Shared::new(&Participant::join(&node, Name::NONE).unwrap()));
-        let (giver, taker) = handover(&shared);
-        (folder, giver, taker)
+    fn ends() -> (TestNode, BatchSender, BatchReceiver) {
+        let node = TestNode::new();
+        let (giver, taker) = handover(&Arc::new(Shared::new(&node.join())));
+        (node, giver, taker)
     }
 
     fn head(id: u16, len: usize) -> Head {
@@ -185,7 +184,7 @@ mod tests {
 
     #[test]
     fn packages_of_all_sizes_come_out_as_they_went_in() {
-        let (_folder, mut giver, mut taker) = ends();
+        let (_node, mut giver, mut taker) = ends();
         let sizes = [0, 1, 1400, BODY_BYTES_MAX, 3, BATCH_BYTES, 0];
         let (mut given, mut taken) = (0, 0);
         for round in 0..20_u16 {
@@ -210,7 +209,7 @@ mod tests {
 
     #[test]
     fn a_full_handover_takes_no_more() {
-        let (_folder, mut giver, mut taker) = ends();
+        let (_node, mut giver, mut taker) = ends();
         let mut given = 0;
         while giver.takes() {
             giver.give(&head(given, 1400), 0, &[0; 1400]);

@@ -15,11 +15,11 @@ use super::rx_thread::{RxSystem, RxThread};
 use super::sending::{NoPackages, Sending};
 use super::slots::SlotParts;
 use super::socket::{InSocket, REPLICA_BYTES};
-use super::threads::{Shared, schedule_below};
+use super::threads::Shared;
 use super::wire::PeerSockets;
 use super::{Shell, ShellError};
 use crate::counts::Cause;
-use crate::driver::{ReplicaDriver, ReplicaWait, RxDriver, part_queue};
+use crate::driver::{OutletStep, ReplicaDriver, RxDriver, part_queue};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
 use crate::impair;
 use crate::replication::{Describe, OneWayClock, ReplicaCounts, ReplicaReceiver, ReplicaSender, ReplicaSettings};
@@ -111,9 +111,9 @@ impl ReplicaTx {
                 self.sender.look(&self.participant, &*self.describe);
             }
             match self.driver.poll(&mut self.sending, |ns| self.clock.at(ns), &mut self.sender) {
-                ReplicaWait::Again => {}
-                ReplicaWait::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
-                ReplicaWait::Wait { for_ns } => self.wait(Duration::from_nanos(for_ns)),
+                OutletStep::Again => {}
+                OutletStep::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
+                OutletStep::Wait { for_ns } => self.wait(Duration::from_nanos(for_ns)),
             }
         }
     }
@@ -190,17 +190,11 @@ impl Shell {
             // It has room for one. If that thread has ended, the router is about to.
             let _ = slots.try_send(SlotParts { sender: sender.clone(), sending, clock });
             let finder = StreamFinder { shared, participant, describe, sender };
-            return self.begin("replicas-out", move || {
-                schedule_below();
-                finder.run();
-            });
+            return self.begin_below("replicas-out", move || finder.run());
         }
         let driver = ReplicaDriver::new(&settings);
         let tx_thread = ReplicaTx { participant, describe, driver, sender, sending, clock, shared };
-        self.begin("replicas-out", move || {
-            schedule_below();
-            tx_thread.run();
-        })
+        self.begin_below("replicas-out", move || tx_thread.run())
     }
 
     /// Opens the port, and starts the thread that writes what comes.
@@ -220,10 +214,7 @@ impl Shell {
             stats: stats.clone(),
             system: RxSystem { shared: self.shared.clone(), socket, delivery, settings, answers: None },
         };
-        self.begin("replicas-in", move || {
-            schedule_below();
-            rx_thread.run();
-        })
+        self.begin_below("replicas-in", move || rx_thread.run())
     }
 
     /// Counters of datagrams, as [`stats`](Shell::stats), for replicas, which have threads and a port of their own; no

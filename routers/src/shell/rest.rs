@@ -1,8 +1,8 @@
 //! The thread that sends what is not real time: scheduled like the modules that it serves, below all real-time threads.
 //!
-//! It has a queue, sockets and a port of its own. What it sends, and when, says the [driver](crate::driver). It shares
-//! the wire's rate with real time, which goes first. A second thread receives at that port. So the kernel separates
-//! both kinds before any thread runs, and a flood of one takes no room or time from the other.
+//! It has a queue, sockets and a port of its own. It shares the wire's rate with real time, which goes first. A second
+//! thread receives at that port. So the kernel separates both kinds before any thread runs, and a flood of one takes no
+//! room or time from the other.
 
 use super::answers::{ErrorReplier, Faults};
 use super::handover::{BatchReceiver, BatchSender, Waited, handover};
@@ -13,7 +13,7 @@ use super::socket::{InSocket, REST_BYTES};
 use super::threads::{Shared, schedule_below};
 use super::wire::PeerSockets;
 use super::{Shell, ShellError, transit};
-use crate::driver::{RestDriver, RestInlet, RestStep, RxDriver};
+use crate::driver::{Outlet, OutletStep, RxDriver, Transmitter};
 use crate::impair;
 use crate::outbound::{Outbound, Package};
 use crate::security::{Gate, Port, Sealing};
@@ -23,51 +23,73 @@ use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::time::Duration;
 
+/// Packages taken before the wire has its turn.
+const BURST: usize = 64;
+/// The end of the router is checked this often, ns.
+const LOOK_NS: u64 = 100_000_000;
+/// Packages for a peer that does not hear this incarnation yet are checked this often, ns.
+const LOOK_AGAIN_NS: u64 = 10_000_000;
+
 /// State of the thread.
-pub(super) struct Rest {
-    pub(super) shared: Arc<Shared>,
-    pub(super) driver: RestDriver,
-    pub(super) inlet: HandoverInlet,
-}
-
-/// What the driver has of the system.
-pub(super) struct HandoverInlet {
-    pub(super) taker: BatchReceiver,
-    pub(super) sending: Sending,
-}
-
-impl RestInlet for HandoverInlet {
-    type Outlet = Sending;
-
-    fn outlet(&mut self) -> &mut Sending {
-        &mut self.sending
-    }
-
-    fn take(&mut self, what: impl FnOnce(&mut Sending, &Package<'_>, bool)) -> bool {
-        let Some((head, published_ns, body, is_last)) = self.taker.next() else { return false };
-        what(&mut self.sending, &Package { head, published_ns, body }, is_last);
-        true
-    }
+struct Rest {
+    shared: Arc<Shared>,
+    transmitter: Transmitter,
+    taker: BatchReceiver,
+    sending: Sending,
 }
 
 impl Rest {
     /// Runs until the router ends.
-    pub(super) fn run(mut self) {
+    fn run(mut self) {
         while !self.shared.ends() {
-            match self.driver.poll(&mut self.inlet) {
-                RestStep::Again => {}
-                RestStep::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
-                RestStep::Wait { for_ns } => {
-                    if self.inlet.taker.wait(Duration::from_nanos(for_ns)) == Waited::Ended {
+            match self.poll() {
+                OutletStep::Again => {}
+                OutletStep::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
+                OutletStep::Wait { for_ns } => {
+                    if self.taker.wait(Duration::from_nanos(for_ns)) == Waited::Ended {
                         return;
                     }
                 }
             }
         }
     }
+
+    /// Does what is due, one datagram at most beside those that leave at once.
+    fn poll(&mut self) -> OutletStep {
+        self.take();
+        let Self { transmitter, sending, .. } = self;
+        let now_ns = sending.monotonic_ns();
+        let Some(until_ns) = transmitter.step(sending, now_ns) else { return OutletStep::Again };
+        let until_ns = until_ns.min(sending.deliver(now_ns));
+        let outbound = &sending.outbound;
+        let look_ns = if outbound.waits() { LOOK_AGAIN_NS } else { LOOK_NS };
+        let for_ns = until_ns.saturating_sub(now_ns).min(look_ns);
+        // More packages wait in the mailbox, where less important ones are displaced.
+        if outbound.has_plenty() { OutletStep::Sleep { for_ns } } else { OutletStep::Wait { for_ns } }
+    }
+
+    /// Takes packages while they are of use.
+    fn take(&mut self) {
+        let Self { transmitter, taker, sending, .. } = self;
+        for _ in 0..BURST {
+            if sending.outbound.has_plenty() {
+                return;
+            }
+            let Some((head, published_ns, body, is_last)) = taker.next() else { return };
+            transmitter.accept(sending, &Package { head, published_ns, body }, is_last);
+        }
+    }
 }
 
 impl Shell {
+    /// Starts a thread that is scheduled below all that are in real time.
+    pub(super) fn begin_below(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), ShellError> {
+        self.begin(name, move || {
+            schedule_below();
+            run();
+        })
+    }
+
     /// Opens the port and starts the two threads for what is not real time, if that is separate. Returns the handover
     /// for the thread that reads the mailbox.
     pub(super) fn begin_rest(
@@ -118,15 +140,9 @@ impl Shell {
         let rx_thread = RxThread { driver, system, stats: stats.clone() };
         self.sockets.push(socket);
         self.rest_stats = Some(stats);
-        let tx_thread = Rest { shared, driver: RestDriver::new(&settings), inlet: HandoverInlet { taker, sending } };
-        self.begin("rest-out", move || {
-            schedule_below();
-            tx_thread.run();
-        })?;
-        self.begin("rest-in", move || {
-            schedule_below();
-            rx_thread.run();
-        })?;
+        let tx_thread = Rest { shared, transmitter: Transmitter::new(&settings), taker, sending };
+        self.begin_below("rest-out", move || tx_thread.run())?;
+        self.begin_below("rest-in", move || rx_thread.run())?;
         Ok(Some(giver))
     }
 }

@@ -133,28 +133,8 @@ impl SenderCache {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost_mailbox::{Node, Priority, Receiver, Shape, Type};
-
-    struct Fixture {
-        _folder: tempfile::TempDir,
-        node: Arc<Node>,
-    }
-
-    impl Fixture {
-        fn new() -> Self {
-            let folder = tempfile::tempdir().unwrap();
-            let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
-            Self { _folder: folder, node }
-        }
-
-        fn join(&self) -> Arc<Participant> {
-            Participant::join(&self.node, Name::NONE).unwrap()
-        }
-
-        fn mailbox(&self, name: Name) -> Receiver {
-            self.join().receiver(name, Shape { slots: 2, body_bytes_max: 8, ..Shape::default() }).unwrap()
-        }
-    }
+    use crate::harness::TestNode;
+    use rohrpost_mailbox::{Priority, Shape, Type};
 
     fn name(number: u16) -> Name {
         Name::new(1, 9, (number >> 8) as u8, number as u8)
@@ -167,8 +147,8 @@ mod tests {
 
     #[test]
     fn a_package_is_sent_on_as_it_is() {
-        let ground = Fixture::new();
-        let mut receiver = ground.mailbox(name(0));
+        let ground = TestNode::new();
+        let mut receiver = ground.mailbox(name(0), 2, 8);
         let mut sender_cache = SenderCache::here(&ground.join(), &[(name(0), name(u16::MAX))]);
         sender_cache.send(&head(name(0)), b"body").unwrap();
         let package = receiver.try_receive().unwrap();
@@ -177,11 +157,11 @@ mod tests {
 
     #[test]
     fn what_is_absent_is_found_when_it_comes_and_forgotten_when_it_goes() {
-        let ground = Fixture::new();
+        let ground = TestNode::new();
         let mut sender_cache = SenderCache::here(&ground.join(), &[(name(0), name(u16::MAX))]);
         for _ in 0..2 {
             assert!(matches!(sender_cache.send(&head(name(0)), b"body"), Err(SendError::NoMailbox(_))));
-            let mut receiver = ground.mailbox(name(0));
+            let mut receiver = ground.mailbox(name(0), 2, 8);
             sender_cache.send(&head(name(0)), b"body").unwrap();
             assert!(receiver.try_receive().is_some());
             receiver.close();
@@ -190,7 +170,7 @@ mod tests {
 
     #[test]
     fn whatever_names_others_write_each_is_looked_for_once_and_those_of_nobody_never() {
-        let ground = Fixture::new();
+        let ground = TestNode::new();
         let (first, last) = (name(0), name(999));
         let mut sender_cache = SenderCache::here(&ground.join(), &[(first, last)]);
         for _ in 0..3 {
@@ -199,16 +179,16 @@ mod tests {
             }
         }
         assert_eq!(sender_cache.looks, 1000, "each of its own once");
-        let mut receiver = ground.mailbox(name(998));
+        let mut receiver = ground.mailbox(name(998), 2, 8);
         sender_cache.send(&head(name(998)), b"body").unwrap();
         assert!(receiver.try_receive().is_some(), "what has come since is found");
     }
 
     #[test]
     fn names_that_a_router_leads_to_are_not_looked_for() {
-        let ground = Fixture::new();
+        let ground = TestNode::new();
         let router = Name::new(1, 250, 0, 3);
-        let mut transit = ground.mailbox(router);
+        let mut transit = ground.mailbox(router, 2, 8);
         let mut sender_cache = SenderCache::everywhere(&ground.join());
         for number in 0..2000 {
             sender_cache.send_by(router, &head(name(number)), b"body").unwrap();
@@ -219,7 +199,7 @@ mod tests {
 
     #[test]
     fn more_mailboxes_than_are_kept_open_are_all_reached() {
-        let ground = Fixture::new();
+        let ground = TestNode::new();
         let me = ground.join();
         let shape = Shape { slots: 2, body_bytes_max: 8, ..Shape::default() };
         let count = WAYS_MAX as u16 + 20;

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::handover::BatchSender;
 use super::wire::PeerSockets;
 use crate::counts::Cause;
-use crate::driver::{Handover, NotSent, Outlet, RealTimeOutlet};
+use crate::driver::{Handover, NotSent, Outlet};
 use crate::frame::NodeIndex;
 use crate::outbound::Outbound;
 use crate::report::Report;
@@ -66,11 +66,9 @@ impl<R: Report> Outlet for Sending<R> {
     fn deliver(&mut self, now_ns: u64) -> u64 {
         self.wire.deliver(now_ns)
     }
-}
 
-impl RealTimeOutlet for Sending {
-    fn rest(&mut self) -> Option<&mut impl Handover> {
-        self.rest.as_mut()
+    fn rest(&mut self) -> Option<&mut dyn Handover> {
+        self.rest.as_mut().map(|rest| rest as &mut dyn Handover)
     }
 }
 

@@ -272,7 +272,7 @@ impl OutSocket {
     }
 }
 
-fn address(of: &SockaddrStorage) -> Option<IpAddr> {
+pub(super) fn address(of: &SockaddrStorage) -> Option<IpAddr> {
     let v4 = of.as_sockaddr_in().map(|of| IpAddr::V4(of.ip()));
     v4.or_else(|| of.as_sockaddr_in6().map(|of| IpAddr::V6(of.ip())))
 }
@@ -286,15 +286,20 @@ fn connect(own: IpAddr, peer: SocketAddr, waiting_bytes: usize) -> io::Result<So
         socket.set_send_buffer_size(waiting_bytes)?;
     }
     socket.bind(&SocketAddr::new(own, 0).into())?;
-    // A refusal of the option is no failure: the network then treats these datagrams like others.
-    let _ = if peer.is_ipv4() { socket.set_tos_v4(TRAFFIC_CLASS) } else { socket.set_tclass_v6(TRAFFIC_CLASS) };
-    // After the class, which sets a priority.
-    let _ = socket.set_priority(PRIORITY);
+    prefer(&socket, peer);
     socket.connect(&peer.into())?;
     Ok(socket)
 }
 
-fn new_socket(of: SocketAddr) -> io::Result<Socket> {
+/// Has datagrams to addresses such as this one go before others.
+pub(super) fn prefer(socket: &Socket, like: SocketAddr) {
+    // A refusal of the option is no failure: the network then treats these datagrams like others.
+    let _ = if like.is_ipv4() { socket.set_tos_v4(TRAFFIC_CLASS) } else { socket.set_tclass_v6(TRAFFIC_CLASS) };
+    // After the class, which sets a priority.
+    let _ = socket.set_priority(PRIORITY);
+}
+
+pub(super) fn new_socket(of: SocketAddr) -> io::Result<Socket> {
     let socket = Socket::new(Domain::for_address(of), Type::DGRAM, Some(Protocol::UDP))?;
     if of.is_ipv6() {
         // Else a port taken here would be taken of all IPv4 addresses too.

@@ -13,7 +13,7 @@ use super::history::{History, RATE_MAX};
 use super::message::{Request, TimeMessage};
 use super::others::Others;
 use super::steadiness::Steadiness;
-use super::types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
+use super::types::{Exchanges, Ignored, Reading, Role, SentId, Step, TimeSettings};
 use super::{Stamp, TIME_BYTES, Term};
 use crate::frame::{FrameHead, HEAD_BYTES, NodeIndex};
 use rohrpost_mailbox::{TimeRecord, TimeSource};
@@ -50,8 +50,12 @@ struct Left {
 /// A Sync that came, and the Request that answers it.
 #[derive(Clone, Copy, Debug, Default)]
 struct PendingExchange {
-    exchange: Exchange,
+    id: u64,
     sequence: u64,
+    sync_came: Stamp,
+    /// Just before the Request was handed to the kernel; 0: it was not.
+    request_sent_ns: u64,
+    request_left: Stamp,
 }
 
 /// The next datagram; its stamps are taken when it is sent.
@@ -91,9 +95,8 @@ pub struct Clock {
     drafts: VecDeque<(NodeIndex, Draft)>,
     sequences: Vec<u64>,
     last_id: u64,
-    last: Option<Exchange>,
+    exchanges: Exchanges,
     offset_ns: i64,
-    contradictions: u64,
     /// Nodes of another configuration.
     others: Others,
     /// Whether the local clock keeps its limits.
@@ -139,9 +142,8 @@ impl Clock {
             drafts: VecDeque::with_capacity(2 * nodes + 2 * PENDING),
             sequences: vec![0; nodes],
             last_id: 0,
-            last: None,
+            exchanges: Exchanges::default(),
             offset_ns: 0,
-            contradictions: 0,
             others: Others::new(settings.nodes),
             steadiness: Steadiness::default(),
             slots: None,
@@ -189,11 +191,11 @@ impl Clock {
             left.at = stamp;
         }
         let mut asked = self.asked.iter_mut();
-        if let Some(asked) = asked.find(|asked| asked.exchange.id != 0 && asked.sequence == id.sequence)
+        if let Some(asked) = asked.find(|asked| asked.id != 0 && asked.sequence == id.sequence)
             && let ElectionState::Slave(master) = self.election.state()
             && master.node == id.to
         {
-            asked.exchange.request_left = stamp;
+            asked.request_left = stamp;
         }
     }
 
@@ -287,14 +289,9 @@ impl Clock {
         self.history.delay_ns()
     }
 
-    /// How often contradictory samples were thrown away: a clock broke its limits.
-    pub fn contradictions(&self) -> u64 {
-        self.contradictions
-    }
-
-    /// Takes out the last exchange.
-    pub fn take_exchange(&mut self) -> Option<Exchange> {
-        self.last.take()
+    /// Exchanges so far.
+    pub fn exchanges(&self) -> Exchanges {
+        self.exchanges
     }
 
     /// Forgets measurements of another timeline.

@@ -81,7 +81,7 @@ pub use follower::Follower;
 pub use limits::{ClockLimits, LIMITS};
 pub(crate) use steadiness::Steadiness;
 pub use steadiness::{Looked, Unsteady};
-pub use types::{Exchange, Ignored, InSlots, Reading, Role, SentId, Step, SyncCounts, TimeSettings};
+pub use types::{Exchanges, Ignored, InSlots, Reading, Role, SentId, Step, SyncCounts, TimeSettings};
 
 /// The bound of a node that does not know the time.
 pub use rohrpost_mailbox::ERROR_UNKNOWN_NS as UNSYNCHRONISED_NS;

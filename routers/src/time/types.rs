@@ -1,7 +1,8 @@
 //! Inputs and outputs of a clock.
 
-use super::{Stamp, Term};
+use super::Term;
 use crate::frame::{BadFrame, NodeIndex};
+use crate::settings::Settings;
 use rohrpost_mailbox::SystemTime;
 use std::time::Duration;
 
@@ -22,6 +23,14 @@ pub struct TimeSettings {
     pub digest: u64,
     /// Distinguishes this incarnation of the router from its others; not 0.
     pub incarnation: u64,
+}
+
+impl TimeSettings {
+    /// Settings of the clock of this router.
+    pub fn of(router: &Settings, masters: &[NodeIndex], interval: Duration) -> Self {
+        let Settings { system, own, digest, incarnation, .. } = *router;
+        Self { system, own, nodes: router.nodes.len() as u8, masters: masters.into(), interval, digest, incarnation }
+    }
 }
 
 /// Role of a node.
@@ -105,28 +114,12 @@ pub struct Reading {
     pub synchronised: bool,
 }
 
-/// One exchange with the stamps of both ends, for diagnosis.
+/// Exchanges that were measured.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Exchange {
-    /// Of Sync, Request and Reply.
-    pub id: u64,
-    /// Sync left: system ns, just before it was handed to the kernel.
-    pub sync_sent_ns: u64,
-    /// Sync left: system ns, as the master knows it.
-    pub sync_left_ns: u64,
-    /// Sync came: local.
-    pub sync_came: Stamp,
-    /// Request left: local, just before it was handed to the kernel.
-    pub request_sent_ns: u64,
-    /// Request left: local.
-    pub request_left: Stamp,
-    /// Request came: system ns.
-    pub request_came_ns: u64,
-    /// Reply left: system ns, just before it was handed to the kernel.
-    pub reply_sent_ns: u64,
-    /// Reply came: local.
-    pub reply_came: Stamp,
-    /// All four relevant stamps are the kernel's.
+pub struct Exchanges {
+    /// So far.
+    pub count: u64,
+    /// Whether all stamps of the last were the kernel's.
     pub by_kernel: bool,
 }
 

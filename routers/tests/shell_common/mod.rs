@@ -1,15 +1,15 @@
 //! Two nodes in one process, each with its router, at addresses of the loopback.
 
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
-use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot};
-use rohrpost_routers::admission::Admission;
+use rohrpost_network::{Security, Tdma};
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::security::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
-use rohrpost_routers::settings::{NodeSettings, Settings};
+use rohrpost_routers::settings::Settings;
 use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
-use rohrpost_routers::time::TimeSettings;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use rohrpost_testbed::lan;
+pub(crate) use rohrpost_testbed::lan::{module, router};
+use std::net::{IpAddr, Ipv4Addr};
 use std::num::NonZeroU8;
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
@@ -18,16 +18,6 @@ use std::time::Duration;
 
 /// What takes longer does not come any more, however busy the computer is.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
-
-/// The module of a node; its mailboxes are what packages go to.
-pub(crate) fn module(node: u8) -> Name {
-    Name::new(1, 100, node, 0)
-}
-
-/// The router of a node.
-pub(crate) fn router(node: u8) -> Name {
-    Name::new(1, 250, node, 0)
-}
 
 /// Answers with the cause's word, behind the first bytes of the command.
 pub(crate) struct Words;
@@ -56,48 +46,14 @@ pub(crate) struct Side {
 /// Two nodes that take turns, 2 ms each.
 #[allow(dead_code, reason = "each test uses a part")]
 pub(crate) fn turns() -> Tdma {
-    let us = Duration::from_micros;
-    let slot =
-        |node: u8| TimeSlot { node, offset: us(1000 + 2000 * u64::from(node)), length: us(2000), period: 1, phase: 0 };
-    Tdma {
-        cycle: us(5000),
-        synchronisation: us(1000),
-        guard: us(400),
-        link_bytes_s: 125_000_000,
-        slots: vec![slot(0), slot(1)],
-        tunnel: None,
-    }
+    lan::slots(2, 1000, [5000, 2000])
 }
 
 impl Side {
     /// Without a router yet. `addresses`: of both.
     pub(crate) fn new(own: u8, node: Arc<Node>, addresses: [IpAddr; 2], tdma: Option<Tdma>) -> Self {
-        let there = module(1 - own);
-        let nodes = [0, 1].map(|node| NodeSettings { name: format!("node{node}"), address: addresses[node] });
-        let network = Network {
-            security: Security::None,
-            port: 21_117,
-            mtu: 1500,
-            datagram_bytes_max: 1472,
-            rate_bytes_s: 1 << 30,
-            quota_bytes: 1 << 20,
-            bulk_below: 16,
-        };
-        let settings = Settings {
-            system: 1,
-            own,
-            nodes: nodes.into(),
-            digest: 7,
-            incarnation: 1,
-            network,
-            tdma,
-            routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
-            senders: vec![vec![module(own)]],
-            hosts: [module(own), router(own)].map(|name| (name, name.with_local(u8::MAX))).into(),
-            admission: Admission { router: Some(router(own).class()), ..Admission::default() },
-            flows: vec![declared(module(own), there)],
-            real_time_from: 0,
-        };
+        let flows = vec![declared(module(own), module(1 - own))];
+        let settings = Settings { flows, ..lan::settings(own, &addresses, tdma) };
         Self { node, settings, sockets: Vec::new(), shell: None }
     }
 
@@ -124,20 +80,9 @@ impl Side {
 
     /// Of the first node's time, where slots need one.
     fn clock(&self) -> Option<ClockParts> {
-        let Settings { system, own, digest, incarnation, ref nodes, ref network, .. } = self.settings;
         let interval = self.settings.tdma.as_ref()?.cycle;
-        let (masters, count) = (vec![0], nodes.len() as u8);
-        let settings = TimeSettings { system, own, nodes: count, masters, interval, digest, incarnation };
-        let nodes = nodes.iter().map(|node| SocketAddr::new(node.address, network.time_port())).collect();
-        Some(ClockParts {
-            settings,
-            nodes,
-            node: Some(self.node.clone()),
-            impair: None,
-            kernel_stamps: true,
-            skew: None,
-            observer: None,
-        })
+        let node = Some(self.node.clone());
+        Some(ClockParts { node, ..ClockParts::of_router(&self.settings, &[0], interval) })
     }
 
     pub(crate) fn join(&self) -> Arc<Participant> {

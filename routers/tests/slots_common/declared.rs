@@ -167,7 +167,6 @@ pub(crate) fn flows_keep_their_bounds(
     let crossed = capture.end();
     assert_inside(beside, segment, &validate(&crossed, segment.time_of(0)));
     let ways = ways(&crossed, &published);
-    bounds_ns.iter().enumerate().for_each(|(flow, bound_ns)| tell(&ways, flow, *bound_ns));
     are_excused(segment, stalls, &ways, &bounds_ns)
 }
 
@@ -185,19 +184,6 @@ fn ways(crossed: &[Crossed], published: &[Vec<u64>]) -> Vec<Way> {
         published.iter().enumerate().map(move |(id, at_ns)| (flow, id, *at_ns)).collect::<Vec<_>>()
     };
     published.iter().enumerate().flat_map(of).map(|(flow, id, at_ns)| way(flow, id, at_ns)).collect()
-}
-
-fn tell(ways: &[Way], flow: usize, bound_ns: u64) {
-    let of_flow = ways.iter().filter(|way| way.flow == flow);
-    let mut took_ns: Vec<_> = of_flow.map(|way| way.crossed_ns.saturating_sub(way.published_ns)).collect();
-    took_ns.sort_unstable();
-    let [p50, most, bound] =
-        [took_ns[took_ns.len() / 2], took_ns[took_ns.len() - 1], bound_ns].map(|ns| ns as f64 / 1e6);
-    let late = took_ns.iter().filter(|took_ns| **took_ns > bound_ns).count();
-    println!(
-        "flow {flow}: {} packages, p50 {p50:.2} ms, at most {most:.2} ms; bound {bound:.2} ms, later {late}",
-        took_ns.len()
-    );
 }
 
 /// What is later than its bound is explained by a stall: by one that kept the package up itself, or that made its

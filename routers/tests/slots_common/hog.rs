@@ -7,8 +7,9 @@ use nix::time::{ClockId, ClockNanosleepFlags, clock_nanosleep};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::sys::{Reservation, Scheduling, reserve, schedule};
 use rohrpost_routers::shell::slots::ActualScheduling;
+use rohrpost_testbed::lan::{Killed, role};
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::Stdio;
 
 const HOG: &str = "ROHRPOST_TEST_HOG";
 const MS: u64 = 1_000_000;
@@ -23,31 +24,19 @@ const FIFO: u8 = 90;
 
 /// Runs until it is dropped.
 pub(crate) struct Hog {
-    child: Child,
+    _process: Killed,
 }
 
 impl Hog {
     /// Starts it, and waits until it is at work. `test` is the test of this program that calls [`be_a_hog`], `routers`
     /// what routers were granted. None where it may not go before them.
     pub(crate) fn start(test: &str, routers: ActualScheduling) -> Option<Self> {
-        let mut command = Command::new(std::env::current_exe().unwrap());
-        command
-            .args(["--exact", test, "--nocapture"])
-            .env(HOG, routers.word())
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped());
-        let mut child = command.spawn().unwrap();
+        let mut command = role(test, HOG, routers.word());
+        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
         let granted = lines.filter_map(|line| line.split_once("hog: ").map(|(_, granted)| granted == "granted")).next();
-        let hog = Self { child };
+        let hog = Self { _process: Killed(child) };
         granted.unwrap_or(false).then_some(hog)
-    }
-}
-
-impl Drop for Hog {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

@@ -42,8 +42,6 @@ pub(crate) struct SlotReport {
     pub(crate) frames: usize,
     /// Of these, in a window of another, or in nobody's.
     pub(crate) outside: Vec<Outside>,
-    /// Of the first frames of slots: how long after the beginning, ns; sorted.
-    pub(crate) starts_ns: Vec<i64>,
 }
 
 pub(crate) fn slot_table(own: u8) -> SlotTable {
@@ -55,40 +53,15 @@ pub(crate) fn slot_table(own: u8) -> SlotTable {
 pub(crate) fn validate(crossed: &[Crossed], time: impl Fn(u64) -> u64) -> SlotReport {
     let table = slot_table(0);
     let mut kept = SlotReport { frames: crossed.len(), ..SlotReport::default() };
-    let mut last = None;
     for frame in crossed {
         let system_ns = time(frame.at_ns);
         let moments = [system_ns, system_ns + table.allowance_ns()];
         let owner = moments.into_iter().filter_map(|ns| table.owner(ns)).find(|owner| owner.node == frame.from);
-        let Some(owner) = owner else {
+        if owner.is_none() {
             kept.outside.push(Outside { from: frame.from, kind: frame.kind, at_ns: frame.at_ns, system_ns });
-            continue;
-        };
-        if last != Some((frame.from, owner.window)) {
-            last = Some((frame.from, owner.window));
-            kept.starts_ns.push(system_ns.wrapping_sub(owner.window.begin_ns).cast_signed());
         }
     }
-    kept.starts_ns.sort_unstable();
     kept
-}
-
-fn tell(what: &str, kept: &SlotReport) {
-    let at = |per_thousand: usize| {
-        kept.starts_ns
-            .get(kept.starts_ns.len().saturating_sub(1) * per_thousand / 1000)
-            .map_or(f64::NAN, |ns| *ns as f64 / 1e3)
-    };
-    println!(
-        "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us \
-         after their nominal time",
-        kept.frames,
-        kept.outside.len(),
-        at(10),
-        at(500),
-        at(990),
-        at(999)
-    );
 }
 
 /// These frames were in their senders' slots, by the time that node `witness` knew when they crossed.
@@ -99,7 +72,6 @@ pub(crate) fn assert_kept(what: &str, segment: &Segment, witness: u8, crossed: &
 /// The same by this time.
 pub(crate) fn assert_kept_by(what: &str, segment: &Segment, crossed: &[Crossed], time: impl Fn(u64) -> u64) {
     let kept = validate(crossed, time);
-    tell(what, &kept);
     assert!(kept.frames > 100, "{kept:?}");
     assert_inside(what, segment, &kept);
 }

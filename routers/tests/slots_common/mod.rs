@@ -17,19 +17,19 @@ use own_log::{EVERY, OwnLog, Recorder};
 use rohrpost_mailbox::{
     Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type, monotonic_ns, realtime_ns,
 };
-use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
-use rohrpost_routers::admission::Admission;
+use rohrpost_network::{Tdma, Tunnel};
 use rohrpost_routers::counts::Cause;
-use rohrpost_routers::frame::{Alive, FrameHead, FrameKind};
+use rohrpost_routers::frame::{FrameHead, FrameKind};
 use rohrpost_routers::impair;
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_routers::lab::Lab;
 use rohrpost_routers::security::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
-use rohrpost_routers::settings::{NodeSettings, Settings};
+use rohrpost_routers::settings::Settings;
 use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered, slots};
 use rohrpost_routers::stats::Stats;
-use rohrpost_routers::time::TimeSettings;
-use rohrpost_testbed::report;
+use rohrpost_testbed::lan;
+pub(crate) use rohrpost_testbed::lan::module;
+use rohrpost_testbed::lan::router;
 use rohrpost_testbed::stalls::Late;
 use std::cell::RefCell;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
@@ -47,17 +47,7 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 /// Slots of 1 ms in a cycle of 10 ms; guards are wide, since all nodes share the processors of one computer with its
 /// other work.
 pub(crate) fn table() -> Tdma {
-    let us = Duration::from_micros;
-    let slot =
-        |node: u8| TimeSlot { node, offset: us(3000 + 2000 * u64::from(node)), length: us(1000), period: 1, phase: 0 };
-    Tdma {
-        cycle: us(10_000),
-        synchronisation: us(1000),
-        guard: us(400),
-        link_bytes_s: 125_000_000,
-        slots: (0..NODES).map(slot).collect(),
-        tunnel: None,
-    }
+    lan::slots(NODES, 3000, [10_000, 1000])
 }
 
 /// A moment of the monotonic clock that is over.
@@ -72,9 +62,7 @@ pub(crate) fn at(node: u8) -> SocketAddr {
 
 /// "Still there", from a node that was launched from another file.
 pub(crate) fn of_another_digest(from: u8, to: u8) -> Vec<u8> {
-    let alive = Alive::default().to_bytes();
-    let head = FrameHead { kind: FrameKind::Alive, system: 1, from, to, digest: 8, incarnation: 1, sequence: 0 };
-    [&head.to_bytes(&[&alive])[..], &alive].concat()
+    lan::alive(FrameHead { kind: FrameKind::Alive, system: 1, from, to, digest: 8, incarnation: 1, sequence: 0 })
 }
 
 /// Kinds of the datagrams that came, until none comes for a moment.
@@ -91,15 +79,6 @@ pub(crate) fn name(node: u8) -> String {
 
 fn address(node: u8) -> IpAddr {
     IpAddr::from([10, 77, 0, node + 1])
-}
-
-/// The module of a node; its mailbox takes what the others send.
-pub(crate) fn module(node: u8) -> Name {
-    Name::new(1, 100, node, 0)
-}
-
-fn router(node: u8) -> Name {
-    Name::new(1, 250, node, 0)
 }
 
 struct Silence;
@@ -127,7 +106,8 @@ impl Station {
         // One computer has one clock: without this, all would be in step from the first moment on.
         let (offset_ns, rate_ppb) = (u64::from(own) * 1_234_000_000, i64::from(own) * 20_000);
         let skew = Skew { offset_ns, rate_ppb, begin_ns, ..Skew::default() };
-        Self { own, node, settings: settings(own, tunnel), skew, late: None, shell: None, recorder: None }
+        let settings = lan::settings(own, &[0, 1, 2].map(address), Some(Tdma { tunnel, ..table() }));
+        Self { own, node, settings, skew, late: None, shell: None, recorder: None }
     }
 
     pub(crate) fn start(&mut self, lab: &Lab) {
@@ -139,23 +119,13 @@ impl Station {
         self.settings.incarnation = self.settings.incarnation.max(realtime_ns()) + 1;
         let settings = self.settings.clone();
         let is_true = self.skew == Skew { begin_ns: self.skew.begin_ns, ..Skew::default() };
+        let cycle = settings.tdma.as_ref().unwrap().cycle;
         let clock = ClockParts {
-            settings: TimeSettings {
-                system: 1,
-                own: self.own,
-                nodes: NODES,
-                masters: MASTERS.into(),
-                interval: settings.tdma.as_ref().unwrap().cycle,
-                digest: settings.digest,
-                incarnation: settings.incarnation,
-            },
-            nodes: (0..NODES).map(|node| SocketAddr::new(address(node), PORT + 1)).collect(),
             // Readers of a page go by the true clock: a skewed one would seem to go back there.
             node: is_true.then(|| self.node.clone()),
             impair: self.late,
-            kernel_stamps: true,
             skew: Some(self.skew),
-            observer: None,
+            ..ClockParts::of_router(&settings, &MASTERS, cycle)
         };
         let name = router(self.own);
         let parts = Parts {
@@ -242,15 +212,7 @@ impl Segment {
         // Two networks at a time would be in each other's way.
         static TURN: Mutex<()> = Mutex::new(());
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        let spec = |node: u8| NodeSpec { name: name(node), address: address(node) };
-        let lab = match Lab::new(&(0..NODES).map(spec).collect::<Vec<_>>(), 1500) {
-            Ok(lab) => lab,
-            Err(LabError::NotAllowed(error)) => {
-                report::skipped(&format!("network namespaces ({error})"));
-                return None;
-            }
-            Err(error) => panic!("{error}"),
-        };
+        let lab = lan::lab(&lan::specs(&[0, 1, 2].map(address)), 1500)?;
         let folder = tempfile::Builder::new().prefix("rohrpost-slots-").tempdir_in("/dev/shm").unwrap();
         let begin_ns = monotonic_ns();
         let station = |own: u8| {
@@ -307,6 +269,11 @@ impl Segment {
         running.flat_map(|(own, stats)| of((own, stats))).collect()
     }
 
+    /// All routers of this process send, and hear each other.
+    pub(crate) fn wait_until_all_send(&self) {
+        self.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    }
+
     pub(crate) fn wait_until(&self, what: &str, mut done: impl FnMut(&Self) -> bool) {
         let began = Instant::now();
         while !done(self) {
@@ -315,37 +282,5 @@ impl Segment {
             assert!(began.elapsed() < PATIENCE, "waited too long until {what}: {:#?}", seen());
             std::thread::sleep(Duration::from_millis(1));
         }
-    }
-}
-
-fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
-    let others = || (0..NODES).filter(|node| *node != own);
-    let route = |name: Name| Route { first: name, last: name.with_local(255), node: name.instance() };
-    Settings {
-        system: 1,
-        own,
-        nodes: (0..NODES).map(|node| NodeSettings { name: name(node), address: address(node) }).collect(),
-        digest: 7,
-        incarnation: realtime_ns(),
-        network: Network {
-            security: Security::None,
-            port: PORT,
-            mtu: 1500,
-            datagram_bytes_max: 1472,
-            rate_bytes_s: 125_000_000,
-            quota_bytes: 1 << 20,
-            bulk_below: 16,
-        },
-        tdma: Some(Tdma { tunnel, ..table() }),
-        routes: others().map(module).chain(others().map(router)).map(route).collect(),
-        senders: vec![vec![module(own)]],
-        hosts: [module(own), router(own)].map(|name| (name, name.with_local(u8::MAX))).into(),
-        admission: Admission {
-            router: Some(router(own).class()),
-            tunnel: tunnel.map(|tunnel| (tunnel, own)),
-            ..Admission::default()
-        },
-        real_time_from: 0,
-        flows: Vec::new(),
     }
 }

@@ -53,11 +53,11 @@ fn record(mut file: File, slots: &SlotStatus, clock: &ClockState, ends: &AtomicB
         let is_last = ends.load(Ordering::Relaxed);
         let at_ns = monotonic_ns();
         let (seen, clock) = (slots.snapshot(), clock.snapshot());
-        let used: Vec<Used> = seen.windows.iter().flatten().copied().collect();
+        let used: Vec<Used> = seen.log.windows.iter().flatten().copied().collect();
         let known = last.and_then(|last| used.iter().rposition(|used| used.window == last.window));
         let is_gap = known.is_none() && used.len() == WINDOWS;
         let counts = seen.counts;
-        let left_out = counts.late + counts.skipped + counts.silent + seen.held + seen.behind;
+        let left_out = counts.late + counts.skipped + counts.silent + seen.log.held + seen.log.behind;
         let TimeRecord { epoch, monotonic_ns, system_ns, pace_ppb, error_ns, drift_ns_s, .. } = clock.record;
         let mut line = format!(
             "{at_ns} {epoch} {monotonic_ns} {system_ns} {pace_ppb} {error_ns} {drift_ns_s} {} {left_out} {}",

@@ -6,8 +6,8 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost_mailbox::{Node, monotonic_ns};
 use rohrpost_routers::shell::clock::Skew;
+use rohrpost_testbed::lan::{Killed, role};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -17,7 +17,7 @@ const STATION: &str = "ROHRPOST_TEST_STATION";
 
 /// The router of a station.
 pub(crate) struct Router {
-    child: Child,
+    process: Killed,
 }
 
 impl Router {
@@ -25,19 +25,21 @@ impl Router {
     pub(crate) fn start(segment: &Segment, own: u8, test: &str) -> Self {
         let Station { node, skew, .. } = &segment.stations[usize::from(own)];
         let (path, Skew { begin_ns, rate_ppb, .. }) = (node.path().display(), skew);
-        let mut command = Command::new(std::env::current_exe().unwrap());
-        command.args(["--exact", test, "--nocapture"]).env(STATION, format!("{own} {begin_ns} {rate_ppb} {path}"));
-        command.stdin(Stdio::null()).stdout(Stdio::null());
-        Self { child: segment.lab.command(&name(own), &mut command).unwrap() }
+        let mut command = role(test, STATION, &format!("{own} {begin_ns} {rate_ppb} {path}"));
+        Self { process: Killed(segment.lab.command(&name(own), &mut command).unwrap()) }
     }
 
     pub(crate) fn signal(&self, signal: Signal) {
-        kill(Pid::from_raw(self.child.id().cast_signed()), signal).unwrap();
+        kill(self.pid(), signal).unwrap();
+    }
+
+    fn pid(&self) -> Pid {
+        Pid::from_raw(self.process.0.id().cast_signed())
     }
 
     /// Stops it for moments, again and again, with pauses between, until that is to end; then it goes on.
     pub(crate) fn stumble(&self, [moment, pause]: [Duration; 2], ends: Arc<AtomicBool>) -> JoinHandle<()> {
-        let pid = Pid::from_raw(self.child.id().cast_signed());
+        let pid = self.pid();
         std::thread::spawn(move || {
             while !ends.load(Ordering::Relaxed) {
                 kill(pid, Signal::SIGSTOP).unwrap();
@@ -51,17 +53,10 @@ impl Router {
     /// Kills it, and waits until it is gone.
     pub(crate) fn kill(mut self, segment: &Segment, own: u8) {
         self.signal(Signal::SIGKILL);
-        self.child.wait().unwrap();
+        self.process.0.wait().unwrap();
         segment.deaths.borrow_mut().push((own, monotonic_ns()));
         // As launch does.
         segment.stations[usize::from(own)].node.announce_death();
-    }
-}
-
-impl Drop for Router {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::{NODES, PATIENCE, Segment, label};
 use rohrpost_mailbox::{Receiver, SendError, Sender};
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// A round of packages comes so much after the one before: a few in each cycle, at any moment of it.
@@ -14,8 +15,8 @@ const FIRST_WORD: u16 = u16::MAX;
 pub(crate) fn talk(segment: &Segment, listeners: &mut Listeners, nodes: &[u8], rounds: u16) {
     let mut talkers = talkers(segment, nodes);
     listeners.acquaint(&mut talkers);
-    listeners.say_all(&mut talkers, rounds);
-    listeners.hear_all(segment, nodes, &(0..rounds).collect::<Vec<_>>());
+    listeners.say_all(&mut talkers, 0..rounds);
+    listeners.hear_all(segment, nodes, 0..rounds);
 }
 
 /// Speaks from one node to another.
@@ -76,9 +77,9 @@ impl Listeners {
         }
     }
 
-    /// So many rounds of packages.
-    pub(crate) fn say_all(&mut self, talkers: &mut [Talker], rounds: u16) {
-        for id in 0..rounds {
+    /// Rounds of packages with these numbers.
+    pub(crate) fn say_all(&mut self, talkers: &mut [Talker], numbers: Range<u16>) {
+        for id in numbers {
             talkers.iter_mut().for_each(|talker| talker.say(id));
             self.listen();
             std::thread::sleep(PAUSE);
@@ -102,7 +103,7 @@ impl Listeners {
 
     /// Waits until all these numbers have come from each of the nodes to each other. That one does not come is known
     /// once a later number has: between two nodes nothing changes its order.
-    pub(crate) fn hear_all(&mut self, segment: &Segment, nodes: &[u8], numbers: &[u16]) {
+    pub(crate) fn hear_all(&mut self, segment: &Segment, nodes: &[u8], numbers: Range<u16>) {
         self.hear_all_unless(segment, nodes, numbers, || false);
     }
 
@@ -111,9 +112,10 @@ impl Listeners {
         &mut self,
         segment: &Segment,
         nodes: &[u8],
-        numbers: &[u16],
+        numbers: Range<u16>,
         has_happened: impl Fn() -> bool,
     ) {
+        let numbers: Vec<u16> = numbers.collect();
         let began = Instant::now();
         for (from, to) in nodes.iter().flat_map(|from| nodes.iter().map(move |to| (*from, *to))) {
             while from != to && self.heard[usize::from(to)][usize::from(from)] != numbers {

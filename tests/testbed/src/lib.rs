@@ -2,6 +2,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod lan;
 pub mod pair;
 pub mod sim;
 pub mod stalls;

@@ -1,14 +1,15 @@
 //! Two routers that know each other, without sockets: what hot paths are tried and counted on.
 
+use crate::lan;
 use rohrpost_mailbox::Name;
-use rohrpost_network::{Network, Route, Security};
+use rohrpost_network::{Network, Route};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::security::{
     HELLO_DATAGRAM_BYTES, Handshake, InstallationKey, KeyId, KeyRing, Opened, Opening, PeerSessions, Port,
     RouterIdentity, Sealing,
 };
-use rohrpost_routers::settings::{NodeSettings, Settings};
+use rohrpost_routers::settings::Settings;
 use std::net::{IpAddr, Ipv4Addr};
 use std::num::NonZeroU8;
 use std::sync::Arc;
@@ -26,28 +27,15 @@ pub fn module(node: NodeIndex) -> Name {
 /// Of one of two nodes on a LAN, 0 or 1, with a module each.
 pub fn settings(own: NodeIndex) -> Settings {
     let other = 1 - own;
+    let lan = lan::settings(own, &[address(0), address(1)], None);
     Settings {
-        system: 1,
-        own,
-        nodes: (0..2).map(|node| NodeSettings { name: format!("n{node}"), address: address(node) }).collect(),
-        digest: 7,
         incarnation: 9,
-        network: Network {
-            security: Security::None,
-            port: 21117,
-            mtu: 1500,
-            datagram_bytes_max: 1472,
-            rate_bytes_s: 1 << 30,
-            quota_bytes: 128 << 10,
-            bulk_below: 16,
-        },
-        tdma: None,
+        network: Network { quota_bytes: 128 << 10, ..lan.network },
         routes: vec![Route { first: module(other), last: module(other).with_local(u8::MAX), node: other }],
         senders: vec![vec![module(own)]],
         hosts: Vec::new(),
         admission: Admission::default(),
-        real_time_from: 0,
-        flows: Vec::new(),
+        ..lan
     }
 }
 

@@ -122,15 +122,7 @@ impl Timed {
             incarnation: monotonic_ns(),
         };
         let nodes = [End::Ping, End::Pong].map(|end| (address(end), PORT).into()).into();
-        let parts = ClockParts {
-            settings,
-            nodes,
-            node: None,
-            impair: None,
-            kernel_stamps: true,
-            skew: Some(skew),
-            observer: None,
-        };
+        let parts = ClockParts { skew: Some(skew), ..ClockParts::at(nodes, settings) };
         let service = ClockService::start(parts).map_err(|error| Failure::of("clock service", error))?;
         Ok(Self { service, skew })
     }

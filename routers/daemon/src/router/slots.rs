@@ -27,15 +27,15 @@ pub(super) fn of(shell: &Shell, slots: &SlotStatus) -> SlotState {
         replacements_heard: syncs.replacements_heard,
         synchronisations_missed: syncs.missed,
         synchronisations_late: counts.synchronisations_late,
-        held: seen.held,
-        overran: seen.overran,
-        behind: seen.behind,
+        held: seen.log.held,
+        overran: seen.log.overran,
+        behind: seen.log.behind,
         unproven: counts.unproven,
         roles: counts.roles,
         lead_ns: seen.lead_ns.0,
         tunnel: shell.tunnel().map(|passed| tunnel(passed)),
         scheduled: seen.granted.word().into(),
-        last: seen.windows.iter().flatten().map(used).collect(),
+        last: seen.log.windows.iter().flatten().map(used).collect(),
     }
 }
 

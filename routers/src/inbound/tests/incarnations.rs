@@ -10,7 +10,8 @@ fn data(from: NodeIndex, to: NodeIndex) -> Head {
     head(module(50, to), module(200, from), 90)
 }
 
-use crate::frame::{Alive, FrameHead, FrameKind, NodeIndex};
+use crate::frame::NodeIndex;
+use crate::port::Port;
 
 #[test]
 fn a_peer_without_a_datagram_for_a_second_is_silent() {
@@ -194,9 +195,7 @@ fn what_waited_in_the_socket_is_not_delivered() {
 
 /// What a router of node 1 could have sent to node 0.
 fn forged(incarnation: u64, sequence: u64) -> Vec<u8> {
-    let said = Alive { heard_incarnation: 100, ..Alive::default() }.to_bytes();
-    let head = FrameHead { kind: FrameKind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation, sequence };
-    [&head.to_bytes(&[&said])[..], &said].concat()
+    super::ports::alive(Port::Packages, incarnation, sequence)
 }
 
 /// It sends as fast as it is asked to.

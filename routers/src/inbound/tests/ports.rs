@@ -12,7 +12,7 @@ use crate::port::Port;
 const PORTS: [Port; 3] = [Port::Packages, Port::Rest, Port::Replicas];
 
 /// "Still there" from node 1 to node 0, at a port.
-fn alive(port: Port, incarnation: u64, sequence: u64) -> Vec<u8> {
+pub(super) fn alive(port: Port, incarnation: u64, sequence: u64) -> Vec<u8> {
     let said = Alive { heard_incarnation: 100, ..Alive::default() }.to_bytes();
     let sequence = port.first_sequence() + sequence;
     let head = FrameHead { kind: FrameKind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation, sequence };

@@ -3,31 +3,17 @@
 use super::{ids, to};
 use crate::counts::Cause;
 use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
-use crate::harness::{End, MS, START};
+use crate::harness::{End, MS, START, slot, tdma};
 use crate::link::ALIVE_EVERY_NS;
 use crate::outbound::{DIRECT_HEAD_BYTES, WAIT_MAX_NS};
 use crate::settings::Settings;
 use rohrpost_mailbox::Priority;
-use rohrpost_network::{Tdma, TimeSlot};
-use std::time::Duration;
+use rohrpost_network::Tdma;
 
 /// Slots of node 0 of these lengths, µs, on a wire of 100 Mbit/s.
 pub(super) fn table(lengths_us: &[u64]) -> Tdma {
-    let slot = |(at, length): (u64, &u64)| TimeSlot {
-        node: 0,
-        offset: Duration::from_millis(at + 1),
-        length: Duration::from_micros(*length),
-        period: 1,
-        phase: 0,
-    };
-    Tdma {
-        cycle: Duration::from_millis(10),
-        synchronisation: Duration::from_micros(300),
-        guard: Duration::from_micros(100),
-        link_bytes_s: 12_500_000,
-        slots: (0..).zip(lengths_us).map(slot).collect(),
-        tunnel: None,
-    }
+    let slots = (0..).zip(lengths_us).map(|(at, length_us)| slot(0, 1000 * (at + 1), *length_us));
+    Tdma { link_bytes_s: 12_500_000, ..tdma([10_000, 300, 100], slots.collect()) }
 }
 
 fn in_slots(lengths_us: &'static [u64]) -> End {

@@ -43,7 +43,7 @@ impl Skew {
 
 /// Local time, and what stamps say by it.
 #[derive(Debug)]
-pub(super) struct LocalClock {
+pub(in crate::shell) struct LocalClock {
     skew: Option<Skew>,
     /// Between these lies CLOCK_REALTIME less the monotonic clock.
     low_ns: i64,
@@ -56,7 +56,7 @@ impl LocalClock {
         Self { skew, low_ns, high_ns }
     }
 
-    pub(super) fn now_ns(&self) -> u64 {
+    pub(in crate::shell) fn now_ns(&self) -> u64 {
         self.local_ns(monotonic_ns())
     }
 

@@ -23,9 +23,10 @@ pub(super) use runtime::ClockRuntime;
 pub use state::{ClockSnapshot, ClockState};
 
 use crate::driver::ClockStep;
+use crate::frame::NodeIndex;
 use crate::impair;
 use crate::settings::Settings;
-use crate::time::{Exchange, TimeSettings};
+use crate::time::TimeSettings;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use rohrpost_config::{FIFO_MAX, Installation, TimeSource};
@@ -35,7 +36,6 @@ use std::io::{self, PipeReader, PipeWriter};
 use std::net::SocketAddr;
 use std::os::fd::AsFd;
 use std::sync::Arc;
-use std::sync::mpsc::SyncSender;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -71,27 +71,26 @@ pub struct ClockParts {
     pub kernel_stamps: bool,
     /// For tests: see [`Skew`].
     pub skew: Option<Skew>,
-    /// For measurements: each exchange, as long as there is room.
-    pub observer: Option<SyncSender<Exchange>>,
 }
 
 impl ClockParts {
     /// The clock of a router of this installation; none unless its time comes from a master.
     pub fn new(router: &Settings, installation: &Installation, node: &Arc<Node>) -> Option<Self> {
         let TimeSource::Master { masters, interval } = &installation.time else { return None };
-        let port = router.network.time_port();
-        let settings = TimeSettings {
-            system: router.system,
-            own: router.own,
-            nodes: router.nodes.len() as u8,
-            masters: masters.clone(),
-            interval: *interval,
-            digest: router.digest,
-            incarnation: router.incarnation,
-        };
-        let nodes = router.nodes.iter().map(|node| SocketAddr::new(node.address, port)).collect();
         let node = Some(node.clone());
-        Some(Self { settings, nodes, node, impair: None, kernel_stamps: true, skew: None, observer: None })
+        Some(Self { node, ..Self::of_router(router, masters, *interval) })
+    }
+
+    /// The clock of a router, without a page.
+    pub fn of_router(router: &Settings, masters: &[NodeIndex], interval: Duration) -> Self {
+        let port = router.network.time_port();
+        let nodes = router.nodes.iter().map(|node| SocketAddr::new(node.address, port)).collect();
+        Self::at(nodes, TimeSettings::of(router, masters, interval))
+    }
+
+    /// A clock with stamps of the kernel, without a page. `nodes`: where each takes datagrams of time, in order.
+    pub fn at(nodes: Vec<SocketAddr>, settings: TimeSettings) -> Self {
+        Self { settings, nodes, node: None, impair: None, kernel_stamps: true, skew: None }
     }
 }
 
@@ -153,7 +152,7 @@ struct Worker {
 impl Worker {
     fn run(&mut self) {
         // The router's other threads tell when it is refused.
-        self.runtime.runs_in_real_time(schedule(Scheduling::Fifo(FIFO)).is_ok());
+        let _ = schedule(Scheduling::Fifo(FIFO));
         loop {
             let ClockStep { for_ns, reads } = self.runtime.poll();
             if self.sleep(Duration::from_nanos(for_ns), reads) {

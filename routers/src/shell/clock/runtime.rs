@@ -6,17 +6,16 @@ use super::socket::{ReceivedDatagram, TimeSocket};
 use super::state::{ClockSnapshot, ClockState};
 use super::{ClockError, ClockParts};
 use crate::driver::{
-    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeStart,
+    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeEvent, TimeInput, TimePlatform, TimeStart,
 };
 use crate::frame::NodeIndex;
 use crate::impair::{Impairment, ImpairmentStep};
 use crate::security::PeerSessions;
-use crate::time::{Clock, Exchange, InSlots, Looked, SentId, Stamp, TIME_BYTES, Unsteady};
+use crate::time::{Clock, InSlots, Looked, SentId, Stamp, Unsteady};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, Watched, monotonic_ns, realtime_ns};
 use std::net::{IpAddr, SocketAddr};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::Arc;
-use std::sync::mpsc::SyncSender;
 
 /// What the impairment keeps besides the bytes.
 #[derive(Clone, Copy)]
@@ -28,27 +27,25 @@ struct DelayedArrival {
 
 /// All of a clock but its thread.
 pub(in crate::shell) struct ClockRuntime {
-    driver: ClockDriver,
-    system: TimeSystem,
+    pub(in crate::shell) driver: ClockDriver,
+    pub(in crate::shell) system: TimeSystem,
 }
 
 /// What the driver has of the system.
-struct TimeSystem {
-    local: LocalClock,
+pub(in crate::shell) struct TimeSystem {
+    pub(in crate::shell) local: LocalClock,
     socket: TimeSocket,
     keeper: Option<TimeKeeper>,
     impairment: Option<Impairment<DelayedArrival>>,
     /// When the impairment has more, local ns.
     held_ns: u64,
-    observer: Option<SyncSender<Exchange>>,
     state: Arc<ClockState>,
-    real_time: bool,
 }
 
 impl ClockRuntime {
     /// Binds the socket. What an earlier incarnation of this router wrote in the node's page goes on.
     pub(in crate::shell) fn new(parts: ClockParts) -> Result<Self, ClockError> {
-        let ClockParts { settings, nodes, node, impair, kernel_stamps, skew, observer } = parts;
+        let ClockParts { settings, nodes, node, impair, kernel_stamps, skew } = parts;
         let own = settings.own;
         let at = nodes.get(usize::from(own)).copied().unwrap_or(SocketAddr::new(IpAddr::from([0; 16]), 0));
         let socket = TimeSocket::open(at, &nodes, settings.digest, kernel_stamps)
@@ -71,9 +68,7 @@ impl ClockRuntime {
             keeper,
             impairment: impair.map(|impair| Impairment::new(impair, u64::from(own) | 0x7469_6d65_0000)),
             held_ns: u64::MAX,
-            observer,
             state: Arc::new(ClockState::new(snapshot)),
-            real_time: false,
         };
         unsteady.into_iter().for_each(warn_unsteady);
         driver.clock().watched().into_iter().for_each(|watched| system.note_watched(&watched));
@@ -98,49 +93,9 @@ impl ClockRuntime {
         &self.system.state
     }
 
-    /// What is known of system time.
-    pub(in crate::shell) fn clock(&self) -> &Clock {
-        self.driver.clock()
-    }
-
-    /// The same, to be changed.
-    pub(in crate::shell) fn clock_mut(&mut self) -> &mut Clock {
-        self.driver.clock_mut()
-    }
-
-    /// Local time.
-    pub(in crate::shell) fn now_ns(&self) -> u64 {
-        self.system.local.now_ns()
-    }
-
-    /// Whether its thread goes before others.
-    pub(in crate::shell) fn runs_in_real_time(&mut self, does: bool) {
-        self.system.real_time = does;
-    }
-
     /// Does what is due: see [`ClockDriver::poll`].
     pub(super) fn poll(&mut self) -> ClockStep {
         self.driver.poll(&mut self.system)
-    }
-
-    /// Hands a datagram of time to the kernel.
-    pub(in crate::shell) fn send(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]) {
-        self.driver.send(&mut self.system, to, datagram);
-    }
-
-    /// See [`ClockDriver::take`].
-    pub(in crate::shell) fn take(&mut self, most: usize, left: impl FnMut(SentId, Stamp)) {
-        self.driver.take(&mut self.system, most, left);
-    }
-
-    /// See [`ClockDriver::take_stranger`].
-    pub(in crate::shell) fn take_stranger(&mut self) -> Option<IpAddr> {
-        self.driver.take_stranger()
-    }
-
-    /// Lets others see how it stands: writes the node's page, and shows it to tools.
-    pub(in crate::shell) fn publish(&mut self) {
-        self.driver.publish(&mut self.system);
     }
 }
 
@@ -205,10 +160,9 @@ impl TimePlatform for TimeSystem {
         self.keeper.iter_mut().for_each(|keeper| keeper.note_watched(watched));
     }
 
-    fn publish(&mut self, clock: &Clock, counts: TimeCounts) {
-        let TimeCounts { exchanges, by_kernel, ignored } = counts;
+    fn publish(&mut self, clock: &Clock, ignored: u64) {
         let seen = ClockSnapshot::of(clock, self.local.now_ns());
-        self.state.show(&ClockSnapshot { exchanges, by_kernel, ignored, real_time: self.real_time, ..seen });
+        self.state.show(&ClockSnapshot { ignored, ..seen });
     }
 
     fn take_new_epoch(&mut self) -> Option<u64> {
@@ -220,12 +174,6 @@ impl TimePlatform for TimeSystem {
             TimeEvent::Unsteady { why, is_new: true } => warn_unsteady(why),
             TimeEvent::NotOpened { source, why: Some((why, datagrams)) } => {
                 tracing::warn!("takes no time from {source}: {why} (datagrams: {datagrams})");
-            }
-            TimeEvent::Measured(exchange) => {
-                if let Some(observer) = &self.observer {
-                    // An observer that does not keep up misses some.
-                    let _ = observer.try_send(*exchange);
-                }
             }
             _ => {}
         }
@@ -266,7 +214,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "these are tests")]
 
     use super::*;
-    use crate::time::TimeSettings;
+    use crate::harness::time_settings;
     use std::net::UdpSocket;
     use std::time::Duration;
 
@@ -277,27 +225,12 @@ mod tests {
             let peer = UdpSocket::bind(("127.9.3.2", 0)).unwrap();
             let port = peer.local_addr().unwrap().port();
             let nodes = [1, 2].map(|host| SocketAddr::from(([127, 9, 3, host], port)));
-            let settings = TimeSettings {
-                system: 1,
-                own: 0,
-                nodes: 2,
-                masters: vec![0],
-                interval: Duration::from_millis(100),
-                digest: 7,
-                incarnation: 1,
-            };
-            let parts = ClockParts {
-                settings,
-                nodes: nodes.to_vec(),
-                node: None,
-                impair: impair.map(|text| text.parse().unwrap()),
-                kernel_stamps: false,
-                skew: None,
-                observer: None,
-            };
+            let settings = time_settings(0, &[0], Duration::from_millis(100));
+            let impair = impair.map(|text| text.parse().unwrap());
+            let parts = ClockParts { impair, kernel_stamps: false, ..ClockParts::at(nodes.to_vec(), settings) };
             let mut runtime = ClockRuntime::new(parts).unwrap();
             (0..40).for_each(|_| assert_eq!(peer.send_to(&[0; 10], nodes[0]).unwrap(), 10));
-            runtime.take(16, |_, _| {});
+            runtime.driver.take(&mut runtime.system, 16, |_, _| {});
             let socket = &mut runtime.system.socket;
             let left = std::iter::from_fn(|| socket.receive(&mut [0; TIME_DATAGRAM_BYTES])).count();
             assert_eq!(left, 24, "{impair:?}");

@@ -6,20 +6,17 @@
 use crate::frame::{FrameHead, NodeIndex};
 use crate::security::TAG_BYTES;
 use crate::shell::filter;
+use crate::shell::socket::{address, new_socket, prefer};
 use crate::time::{SentId, TIME_BYTES};
 use nix::errno::Errno;
 use nix::sys::socket::{
     ControlMessageOwned, MsgFlags, SockaddrStorage, TimestampingFlag, recvmsg, sendto, setsockopt, sockopt,
 };
 use nix::sys::time::TimeSpec;
-use socket2::{Domain, Protocol, Socket, Type};
 use std::io::{self, IoSliceMut};
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
 
-/// Expedited forwarding, and the priority in this computer's queues, as the router's packages have.
-const TRAFFIC_CLASS: u32 = 46 << 2;
-const PRIORITY: u32 = 6;
 /// A datagram that comes back has the heads of lower layers before it.
 const RETURNED_BYTES: usize = TIME_BYTES + TAG_BYTES + 128;
 const CONTROL_BYTES: usize = 512;
@@ -45,13 +42,8 @@ pub(super) struct ReceivedDatagram {
 impl TimeSocket {
     /// Binds `own`; peers are reached at the port given with them.
     pub(super) fn open(own: SocketAddr, peers: &[SocketAddr], digest: u64, kernel_stamps: bool) -> io::Result<Self> {
-        let socket = Socket::new(Domain::for_address(own), Type::DGRAM, Some(Protocol::UDP))?;
-        if own.is_ipv6() {
-            socket.set_only_v6(true)?;
-        }
-        // Refusals are not worth a failure: the network then treats these datagrams as all others.
-        let _ = if own.is_ipv4() { socket.set_tos_v4(TRAFFIC_CLASS) } else { socket.set_tclass_v6(TRAFFIC_CLASS) };
-        let _ = socket.set_priority(PRIORITY);
+        let socket = new_socket(own)?;
+        prefer(&socket, own);
         let wanted = TimestampingFlag::SOF_TIMESTAMPING_TX_SOFTWARE
             | TimestampingFlag::SOF_TIMESTAMPING_RX_SOFTWARE
             | TimestampingFlag::SOF_TIMESTAMPING_SOFTWARE;
@@ -127,11 +119,6 @@ impl AsFd for TimeSocket {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
     }
-}
-
-fn address(of: &SockaddrStorage) -> Option<IpAddr> {
-    let v4 = of.as_sockaddr_in().map(|address| IpAddr::V4(address.ip()));
-    v4.or_else(|| of.as_sockaddr_in6().map(|address| IpAddr::V6(address.ip())))
 }
 
 fn stamp(mut messages: impl Iterator<Item = ControlMessageOwned>) -> Option<u64> {

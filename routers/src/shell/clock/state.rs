@@ -2,7 +2,7 @@
 
 use crate::frame::NodeIndex;
 use crate::replication::MeasuredRoundTrip;
-use crate::time::{Clock, Reading, Role, Term};
+use crate::time::{Clock, Exchanges, Reading, Role, Term};
 use rohrpost_mailbox::TimeRecord;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -26,23 +26,18 @@ pub struct ClockSnapshot {
     pub rate_ppb: i64,
     /// Shortest recent round trip, ns.
     pub delay_ns: Option<u64>,
-    /// When the master was heard last, monotonic ns.
-    pub heard_ns: Option<u64>,
-    /// Exchanges so far; and how often a clock did what it must not.
+    /// Exchanges so far.
     pub exchanges: u64,
-    /// See [`Clock::contradictions`].
-    pub contradictions: u64,
     /// Whether all stamps of the last exchange were the kernel's.
     pub by_kernel: bool,
     /// Datagrams that were not taken.
     pub ignored: u64,
-    /// Whether the thread runs in real time.
-    pub real_time: bool,
 }
 
 impl ClockSnapshot {
     pub(super) fn of(clock: &Clock, now_ns: u64) -> Self {
         let Reading { term, synchronised, .. } = clock.reading(now_ns);
+        let Exchanges { count: exchanges, by_kernel } = clock.exchanges();
         Self {
             role: clock.role(),
             master: clock.master(),
@@ -52,12 +47,9 @@ impl ClockSnapshot {
             offset_ns: clock.offset_ns(),
             rate_ppb: clock.rate_ppb(),
             delay_ns: clock.delay_ns(),
-            heard_ns: clock.heard_ns(now_ns),
-            exchanges: 0,
-            contradictions: clock.contradictions(),
-            by_kernel: false,
+            exchanges,
+            by_kernel,
             ignored: 0,
-            real_time: false,
         }
     }
 }

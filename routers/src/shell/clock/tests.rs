@@ -1,11 +1,12 @@
 //! Clocks on this computer, each with a wrong monotonic clock of its own: so the true error of each reading is known.
 
 use super::{ClockParts, ClockService, ClockSnapshot, Skew};
-use crate::time::{Exchange, Role, TimeSettings};
-use rohrpost_mailbox::monotonic_ns;
+use crate::harness::time_settings;
+use crate::time::{Role, TimeSettings};
+use rohrpost_mailbox::{TimeRecord, monotonic_ns};
+use rohrpost_testbed::lan::{self, Lab};
 use rohrpost_testbed::stalls::{Late, unless_stalled};
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
 const MS: u64 = 1_000_000;
@@ -14,16 +15,28 @@ const MS: u64 = 1_000_000;
 struct Clocks {
     services: Vec<Option<ClockService>>,
     parts: Vec<(Skew, SocketAddr)>,
-    exchanges: Vec<Receiver<Exchange>>,
+    masters: Vec<u8>,
     interval: Duration,
     kernel_stamps: bool,
+    /// Where each has a namespace of its own.
+    lab: Option<Lab>,
 }
 
 impl Clocks {
-    fn new(nodes: u8, interval: Duration, kernel_stamps: bool) -> Self {
-        let address = |node: u8| IpAddr::V4(Ipv4Addr::new(127, 9, 0, node + 1));
+    /// Three nodes, of which two may be master.
+    fn new(interval: Duration, kernel_stamps: bool) -> Self {
+        let addresses = [1, 2, 3].map(|host| IpAddr::from([127, 9, 0, host]));
         // The same port on all, as in an installation: one that is free on the last is free on the others.
-        let port = UdpSocket::bind((address(nodes - 1), 0)).unwrap().local_addr().unwrap().port();
+        let port = UdpSocket::bind((addresses[2], 0)).unwrap().local_addr().unwrap().port();
+        Self::at(addresses.map(|address| SocketAddr::new(address, port)), &[0, 1], (interval, kernel_stamps), None)
+    }
+
+    fn at(
+        addresses: [SocketAddr; 3],
+        masters: &[u8],
+        (interval, kernel_stamps): (Duration, bool),
+        lab: Option<Lab>,
+    ) -> Self {
         let begin_ns = monotonic_ns();
         let skew = |node: u8| Skew {
             offset_ns: u64::from(node) * 1_234 * MS,
@@ -31,38 +44,24 @@ impl Clocks {
             wander_ppb: if node == 0 { 0.0 } else { 500.0 },
             begin_ns,
         };
-        let parts = (0..nodes).map(|node| (skew(node), SocketAddr::new(address(node), port))).collect();
-        let mut clocks = Self { services: Vec::new(), parts, exchanges: Vec::new(), interval, kernel_stamps };
-        for node in 0..nodes {
-            clocks.services.push(None);
-            clocks.exchanges.push(sync_channel(0).1);
-            clocks.start(node);
-        }
+        let parts = (0..).zip(addresses).map(|(node, address)| (skew(node), address)).collect();
+        let (services, masters) = ((0..3).map(|_| None).collect(), masters.to_vec());
+        let mut clocks = Self { services, parts, masters, interval, kernel_stamps, lab };
+        (0..3).for_each(|node| clocks.start(node));
         clocks
     }
 
     fn start(&mut self, node: u8) {
-        let (observer, exchanges) = sync_channel(1 << 16);
-        let settings = TimeSettings {
-            system: 1,
-            own: node,
-            nodes: self.parts.len() as u8,
-            masters: vec![0, 1],
-            interval: self.interval,
-            digest: 7,
-            incarnation: monotonic_ns(),
-        };
+        let settings = time_settings(node, &self.masters, self.interval);
+        let settings = TimeSettings { incarnation: monotonic_ns(), ..settings };
+        let _inside = self.lab.as_ref().map(|lab| lab.enter(&format!("n{node}")).unwrap());
+        let addresses = self.parts.iter().map(|(_, address)| *address).collect();
         let service = ClockService::start(ClockParts {
-            settings,
-            nodes: self.parts.iter().map(|(_, address)| *address).collect(),
-            node: None,
-            impair: None,
             kernel_stamps: self.kernel_stamps,
             skew: Some(self.parts[usize::from(node)].0),
-            observer: Some(observer),
+            ..ClockParts::at(addresses, settings)
         });
         self.services[usize::from(node)] = Some(service.unwrap());
-        self.exchanges[usize::from(node)] = exchanges;
     }
 
     fn snapshot(&self, node: u8) -> ClockSnapshot {
@@ -130,7 +129,7 @@ impl Clocks {
 #[test]
 fn bounds_hold_without_stamps_by_the_kernel() {
     unless_stalled(|_| {
-        let clocks = Clocks::new(3, Duration::from_millis(50), false);
+        let clocks = Clocks::new(Duration::from_millis(50), false);
         let master = clocks.check_bounds()?;
         assert!([1 - master, 2].iter().all(|slave| !clocks.snapshot(*slave).by_kernel));
         Ok(())
@@ -140,7 +139,7 @@ fn bounds_hold_without_stamps_by_the_kernel() {
 #[test]
 fn slaves_know_the_masters_time_within_their_bounds_and_go_on_when_it_ends() {
     unless_stalled(|_| {
-        let mut clocks = Clocks::new(3, Duration::from_millis(50), true);
+        let mut clocks = Clocks::new(Duration::from_millis(50), true);
         let first = clocks.check_bounds()?;
         clocks.services[usize::from(first)] = None;
         let before = clocks.read(2, monotonic_ns()).0;
@@ -152,4 +151,35 @@ fn slaves_know_the_masters_time_within_their_bounds_and_go_on_when_it_ends() {
         assert!(clocks.snapshot(2).ignored < 10, "{:?}", clocks.snapshot(2));
         Ok(())
     });
+}
+
+/// How large errors are, also under load and beside RTnet's formula, is measured by the case `clock` of the bench.
+#[test]
+fn slaves_are_within_their_bounds() {
+    let addresses = [1, 2, 3].map(|host| IpAddr::from([10, 77, 0, host]));
+    let Some(lab) = lan::lab(&lan::specs(&addresses), 1500) else { return };
+    let sockets = addresses.map(|address| SocketAddr::new(address, 21_118));
+    let mut clocks = Clocks::at(sockets, &[0], (Duration::from_millis(100), true), Some(lab));
+    clocks.follow(&[1, 2], 0);
+    clocks.wait("exchanges", || [1, 2].iter().all(|slave| clocks.snapshot(*slave).exchanges > 40));
+    let are_within = |clocks: &Clocks, master: TimeRecord| {
+        for slave in [1, 2] {
+            let now_ns = monotonic_ns();
+            let (own, error) = clocks.read(slave, now_ns);
+            let off_ns = (own - i128::from(master.at(clocks.parts[0].0.local_ns(now_ns)).ns)).unsigned_abs();
+            assert!(off_ns <= error, "{off_ns} ns off, bound {error}");
+        }
+    };
+    let end = Instant::now() + Duration::from_secs(2);
+    while Instant::now() < end {
+        std::thread::sleep(Duration::from_millis(1));
+        are_within(&clocks, clocks.snapshot(0).record);
+    }
+    // The master ends, and nobody else may be: the slaves go on by themselves, and their bounds go on to hold.
+    let last = clocks.snapshot(0).record;
+    clocks.services[0] = None;
+    for _ in 0..10 {
+        std::thread::sleep(Duration::from_millis(100));
+        are_within(&clocks, last);
+    }
 }

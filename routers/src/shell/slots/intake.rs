@@ -47,9 +47,9 @@ impl<R: Report, N: Fn() -> u64> Transit for TransitAdapter<'_, R, N> {
 mod tests {
     use super::*;
     use crate::counts::Cause;
-    use crate::harness::{End, S, module};
+    use crate::harness::{End, S, TestNode, module};
     use crate::intake::{FEW, Intake, LEFT_NS_MIN, MAKING_NS, TAKING_NS, UNTAKEN_NS_MAX};
-    use rohrpost_mailbox::{HEAD_BYTES, Label, Name, Node, Participant, Sender, Shape, Type};
+    use rohrpost_mailbox::{HEAD_BYTES, Label, Sender, Shape, Type};
 
     /// A package of this body takes 50 bytes of a slot.
     const BODY: [u8; 50 - HEAD_BYTES] = [7; 50 - HEAD_BYTES];
@@ -63,25 +63,23 @@ mod tests {
         end: End,
         /// Time until the thread has to wake up.
         left_ns: u64,
-        _folder: tempfile::TempDir,
+        _node: TestNode,
     }
 
     impl Ground {
         /// That began so long ago.
         fn new(age_ns: u64) -> Self {
-            let folder = tempfile::tempdir().unwrap();
-            let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
-            let join = || Participant::join(&node, Name::NONE).unwrap();
+            let node = TestNode::new();
             let shape = Shape { slots: SLOTS, full: rohrpost_mailbox::OverflowPolicy::Displace, ..Shape::default() };
-            let transit = join().receiver(module(100, 1), shape).unwrap();
-            let sender = join().sender(module(100, 1)).unwrap();
+            let transit = node.join().receiver(module(100, 1), shape).unwrap();
+            let sender = node.join().sender(module(100, 1)).unwrap();
             Self {
                 intake: Intake::new(monotonic_ns()),
                 transit,
                 sender,
                 end: End::begin(0, monotonic_ns() - age_ns, |_| {}),
                 left_ns: u64::MAX,
-                _folder: folder,
+                _node: node,
             }
         }
 

@@ -28,7 +28,7 @@ use crate::report::Report;
 use crate::security::PeerSessions;
 use crate::settings::Settings;
 use crate::stats::Stats;
-use crate::tdma::SlotScheduler;
+use crate::tdma::{SlotCounts, SlotScheduler};
 use crate::time::{Clock, SentId, Stamp, TIME_BYTES};
 use intake::TransitAdapter;
 use rohrpost_mailbox::{Name, Receiver, monotonic_ns};
@@ -81,7 +81,13 @@ impl SlotThread {
         scheduler: SlotScheduler,
     ) -> Self {
         let TransitInlet { transit, sending } = inlet;
-        let snapshot = SlotSnapshot::new(scheduler.silent());
+        let snapshot = SlotSnapshot {
+            counts: SlotCounts::default(),
+            silent: scheduler.silent(),
+            lead_ns: (0, 0),
+            granted: ActualScheduling::Ordinary,
+            log: WindowLog::default(),
+        };
         let state = Arc::new(SlotStatus::new(snapshot));
         let Own { router, settings, peer_sessions, answers, parts: parts_come } = own;
         let driver = SlotDriver::new(&settings, peer_sessions.as_ref(), scheduler, monotonic_ns());
@@ -117,7 +123,6 @@ impl SlotThread {
         let Self { mut driver, mut system } = self;
         sleep::be_punctual();
         system.snapshot.granted = ActualScheduling::ask(driver.scheduler().table());
-        system.clock.runs_in_real_time(system.snapshot.granted != ActualScheduling::Ordinary);
         while !system.shared.ends() {
             match driver.poll(&mut system) {
                 SlotStep::Sleep { for_ns } => sleep::sleep(for_ns),
@@ -129,7 +134,7 @@ impl SlotThread {
 
 impl Platform for System {
     fn local_ns(&self) -> u64 {
-        self.clock.now_ns()
+        self.clock.system.local.now_ns()
     }
 
     fn monotonic_ns(&self) -> u64 {
@@ -137,16 +142,16 @@ impl Platform for System {
     }
 
     fn clock(&self) -> &Clock {
-        self.clock.clock()
+        self.clock.driver.clock()
     }
 
     fn time(&mut self) -> (&mut Clock, &Stats) {
-        (self.clock.clock_mut(), &self.stats)
+        (self.clock.driver.clock_mut(), &self.stats)
     }
 
     fn transit(&mut self) -> impl Transit {
         let Self { transit, sending: Sending { outbound, answers: report, .. }, clock, .. } = self;
-        TransitAdapter { transit, outbound, report, local_ns: || clock.now_ns() }
+        TransitAdapter { transit, outbound, report, local_ns: || clock.system.local.now_ns() }
     }
 
     fn queue(&mut self) -> (&mut Outbound, impl Report) {
@@ -158,7 +163,7 @@ impl Platform for System {
     }
 
     fn send_time(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]) {
-        self.clock.send(to, datagram);
+        self.clock.driver.send(&mut self.clock.system, to, datagram);
     }
 
     fn next_answer(&mut self) -> Option<Answer> {
@@ -170,11 +175,11 @@ impl Platform for System {
     }
 
     fn take_time(&mut self, most: usize, left: impl FnMut(SentId, Stamp)) {
-        self.clock.take(most, left);
+        self.clock.driver.take(&mut self.clock.system, most, left);
     }
 
     fn take_stranger(&mut self) -> Option<IpAddr> {
-        self.clock.take_stranger()
+        self.clock.driver.take_stranger()
     }
 
     fn tidy(&mut self, now_ns: u64) {
@@ -194,13 +199,12 @@ impl Platform for System {
     }
 
     fn publish(&mut self, scheduler: &SlotScheduler, log: &WindowLog) {
-        self.clock.publish();
-        let Self { clock, settings, snapshot, state, .. } = self;
-        let (before, silent) = (snapshot.silent, scheduler.silent());
-        messages::tell_change(before, silent, || messages::parted(settings, clock.clock().parted_by(clock.now_ns())));
-        let (counts, lead_ns) = (scheduler.counts(clock.clock()), scheduler.lead_ns());
-        let WindowLog { held, overran, behind, windows } = *log;
-        *snapshot = SlotSnapshot { counts, silent, lead_ns, held, overran, behind, windows, ..*snapshot };
+        let Self { clock: ClockRuntime { driver, system }, settings, snapshot, state, .. } = self;
+        driver.publish(system);
+        let (clock, before, silent) = (driver.clock(), snapshot.silent, scheduler.silent());
+        messages::tell_change(before, silent, || messages::parted(settings, clock.parted_by(system.local.now_ns())));
+        let (counts, lead_ns) = (scheduler.counts(clock), scheduler.lead_ns());
+        *snapshot = SlotSnapshot { counts, silent, lead_ns, log: *log, ..*snapshot };
         state.show(snapshot);
     }
 

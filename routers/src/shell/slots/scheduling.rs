@@ -125,8 +125,8 @@ fn busiest_ns(table: &SlotTable, period_ns: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::harness::settings;
-    use rohrpost_network::{Tdma, TimeSlot};
+    use crate::harness::{settings, slot, tdma};
+    use rohrpost_network::TimeSlot;
 
     const US: u64 = 1_000;
     const MS: u64 = 1_000_000;
@@ -134,21 +134,13 @@ mod tests {
     /// Slots of node 0, each with its length in µs and its period; guards of 100 µs, and a window of 300 µs for the
     /// master's synchronisation.
     fn wanted(cycle_us: u64, slots: &[(u64, u32)]) -> Wanted {
-        let mut offset = Duration::from_micros(300);
-        let slot = |(length_us, period): &(u64, u32)| {
-            let length = Duration::from_micros(*length_us);
-            let slot = TimeSlot { node: 0, offset, length, period: *period, phase: 0 };
-            offset += length;
+        let mut offset_us = 300;
+        let slots = slots.iter().map(|(length_us, period)| {
+            let slot = TimeSlot { period: *period, ..slot(0, offset_us, *length_us) };
+            offset_us += length_us;
             slot
-        };
-        let tdma = Tdma {
-            cycle: Duration::from_micros(cycle_us),
-            synchronisation: Duration::from_micros(300),
-            guard: Duration::from_micros(100),
-            link_bytes_s: 125_000_000,
-            slots: slots.iter().map(slot).collect(),
-            tunnel: None,
-        };
+        });
+        let tdma = tdma([cycle_us, 300, 100], slots.collect());
         Wanted::new(&SlotTable::new(&tdma, &[0], 0, 3, settings(0, 3).overhead_bytes()))
     }
 

@@ -1,7 +1,7 @@
 //! What the thread of the time slots lets others see.
 
 use super::scheduling::ActualScheduling;
-use crate::driver::{Used, WINDOWS};
+use crate::driver::WindowLog;
 use crate::tdma::{Silent, SlotCounts};
 use std::sync::{Mutex, PoisonError};
 
@@ -16,30 +16,8 @@ pub struct SlotSnapshot {
     pub lead_ns: (u64, u64),
     /// How the thread is scheduled.
     pub granted: ActualScheduling,
-    /// Datagrams that waited for the next slot, since the thread stood still between their making and their leaving.
-    pub held: u64,
-    /// Windows that were over when the call for their last datagram came back: it may have left outside.
-    pub overran: u64,
-    /// Slots that began too late, or took too long, for what bounds assume.
-    pub behind: u64,
-    /// The last windows that were used, the oldest first, as far as there were so many.
-    pub windows: [Option<Used>; WINDOWS],
-}
-
-impl SlotSnapshot {
-    /// Snapshot of a router that begins.
-    pub(super) fn new(silent: Option<Silent>) -> Self {
-        Self {
-            counts: SlotCounts::default(),
-            silent,
-            lead_ns: (0, 0),
-            granted: ActualScheduling::Ordinary,
-            held: 0,
-            overran: 0,
-            behind: 0,
-            windows: [None; WINDOWS],
-        }
-    }
+    /// The last windows, and what missed its own.
+    pub log: WindowLog,
 }
 
 /// Shared by the thread of the time slots and its readers.

@@ -1,11 +1,13 @@
 //! One node that knows no peer yet, and hears unverified frames.
 
-use super::world::{CYCLE, MASTERS, SECOND, US, World, table};
-use crate::frame::FrameHead;
-use crate::tdma::{Carries, GATE_NS, Next, Silent, SlotScheduler, UNPROVEN_CYCLES, WindowKind, WindowVerdict};
+use super::world::{CYCLE, HEADS, MASTERS, SECOND, US, World, table, tdma};
+use crate::harness::{time_frame, time_settings};
+use crate::tdma::{
+    Carries, GATE_NS, Next, Silent, SlotScheduler, SlotTable, UNPROVEN_CYCLES, WindowKind, WindowVerdict,
+};
 use crate::time::message::{Request, Sync, TimeMessage};
 use crate::time::{Clock, Ignored, Role, Stamp, Step, TIME_BYTES, Term, TimeSettings};
-use std::time::Duration;
+use rohrpost_network::Tdma;
 
 /// A node that hears nothing for this long begins a time; node 1 one cycle later.
 const LISTENS: u64 = 100_000_000 + 9 * CYCLE;
@@ -17,6 +19,15 @@ const PATIENCE: u64 = 2 * SECOND + 64 * CYCLE;
 const JOINS: u64 = (8 + 4 * 2) * UNPROVEN_CYCLES * CYCLE;
 /// Distance of the second master's beginning from the first one's, if both keep hearing frames; else it is a cycle.
 const APART: u64 = JOINS + 100_000_000 + 8 * CYCLE;
+
+fn stamp(ns: u64) -> Stamp {
+    Stamp { ns, doubt_ns: 0, by_kernel: true }
+}
+
+/// A Sync of a master that nobody follows yet.
+fn sync(id: u64, cycle: u64, sent_ns: u64, term: Term) -> Sync {
+    Sync { id, cycle, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() }
+}
 
 /// A node that may be master, and hears unverified frames of another.
 struct Ear {
@@ -32,25 +43,21 @@ impl Ear {
     }
 
     fn among(own: u8, nodes: u8, masters: &[u8]) -> Self {
-        let settings = TimeSettings {
-            system: 1,
-            own,
-            nodes,
-            masters: masters.to_vec(),
-            interval: Duration::from_nanos(CYCLE),
-            digest: 7,
-            incarnation: 9,
-        };
+        let settings = TimeSettings { nodes, ..time_settings(own, masters, tdma().cycle) };
         let (now_ns, table) = (10 * SECOND, table(own));
         let clock = Clock::new(settings, now_ns, SECOND, None).in_slots(table.for_clock());
         Self { clock, scheduler: SlotScheduler::new(table, 100 * US), now_ns, sequence: 0 }
     }
 
     fn overhears_of(&mut self, from: u8, message: &TimeMessage) -> Result<(), Ignored> {
-        let (kind, sequence, to) = (message.kind(), self.sequence, self.scheduler.table().own());
-        let head = FrameHead { kind, system: 1, from, to, digest: 7, incarnation: 5, sequence };
-        let came = Stamp { ns: self.now_ns, doubt_ns: 0, by_kernel: true };
-        self.clock.overhear(self.now_ns, came, &head, &message.to_bytes())
+        let (head, rest) = time_frame((from, self.scheduler.table().own()), self.sequence, message);
+        self.clock.overhear(self.now_ns, stamp(self.now_ns), &head, &rest)
+    }
+
+    /// A Sync of node 0 to node 2, which lives.
+    fn hears(&mut self, sync: Sync) {
+        let (head, rest) = time_frame((0, 2), sync.id, &TimeMessage::Sync(sync));
+        self.clock.handle(self.now_ns, stamp(self.now_ns), &head, &rest).unwrap();
     }
 
     /// A Sync of node 0, by a time that is a thousand seconds ahead; a cycle later than the last.
@@ -58,9 +65,8 @@ impl Ear {
         self.pass(CYCLE);
         self.sequence += 1;
         let (sent_ns, term) = (self.now_ns + 1000 * SECOND, Term::new(7, 0));
-        let (id, cycle) = (self.sequence, sent_ns / CYCLE);
-        let sync = Sync { id, cycle, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
-        self.overhears_of(0, &TimeMessage::Sync(Sync { followed: true, ..sync }))
+        let sync = Sync { followed: true, ..sync(self.sequence, sent_ns / CYCLE, sent_ns, term) };
+        self.overhears_of(0, &TimeMessage::Sync(sync))
     }
 
     /// A node that has time, a thousand seconds ahead, and hears no master.
@@ -218,9 +224,8 @@ fn a_window_of_what_is_overheard_is_no_slot_of_the_nodes_own_time() {
         scheduler.next(now_ns, clock);
         let sent_ns = clock.reading(now_ns).time.ns + 1000 * SECOND;
         let message = TimeMessage::Request(Request { epoch: 9, sent_ns, timed: true, ..Request::default() });
-        let head = FrameHead { kind: message.kind(), system: 1, from: 0, to: 2, digest: 7, incarnation: 5, sequence };
-        let came = Stamp { ns: now_ns, doubt_ns: 0, by_kernel: true };
-        clock.overhear(now_ns, came, &head, &message.to_bytes()).unwrap();
+        let (head, rest) = time_frame((0, 2), sequence, &message);
+        clock.overhear(now_ns, stamp(now_ns), &head, &rest).unwrap();
     }
     let Next::Window(planned) = scheduler.next(now_ns, clock) else { panic!("silent") };
     assert_eq!(planned.carries, Carries::Hello);
@@ -241,12 +246,7 @@ fn a_node_that_meanwhile_follows_a_live_master_asks_for_its_window_anew() {
     let Next::Window(planned) = ear.scheduler.next(ear.now_ns, &ear.clock) else { panic!("silent") };
     for id in 101..=108 {
         let (sent_ns, term) = (ear.now_ns + 1000 * SECOND, Term::new(7, 0));
-        let sync = Sync { id, cycle: id, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
-        let message = TimeMessage::Sync(sync);
-        let head =
-            FrameHead { kind: message.kind(), system: 1, from: 0, to: 2, digest: 7, incarnation: 5, sequence: id };
-        let came = Stamp { ns: ear.now_ns, doubt_ns: 0, by_kernel: true };
-        ear.clock.handle(ear.now_ns, came, &head, &message.to_bytes()).unwrap();
+        ear.hears(sync(id, id, sent_ns, term));
     }
     assert!(matches!(ear.scheduler.validate(&planned, planned.call_ns, &ear.clock), WindowVerdict::Early));
     let Next::Window(anew) = ear.scheduler.next(planned.call_ns, &ear.clock) else { panic!("silent") };
@@ -255,18 +255,18 @@ fn a_node_that_meanwhile_follows_a_live_master_asks_for_its_window_anew() {
 
 #[test]
 fn rare_slots_are_waited_for() {
-    let mut slots = super::world::tdma();
+    let clock_of = |slots: &Tdma, own| SlotTable::new(slots, &MASTERS, own, 3, HEADS).for_clock();
+    let mut slots = tdma();
     assert_eq!(table(0).for_clock().hello_every_ns, UNPROVEN_CYCLES * CYCLE);
     slots.slots[0].period = 16;
     slots.slots[2].period = 32;
-    let table = crate::tdma::SlotTable::new(&slots, &MASTERS, 1, 3, super::world::HEADS);
-    assert_eq!(table.for_clock().slot_every_ns, 16 * CYCLE);
-    assert_eq!(table.for_clock().asks_every_ns, 16 * CYCLE, "a master has it");
-    assert_eq!(table.for_clock().hello_every_ns, 16 * CYCLE, "node 2 has another one in each third cycle");
-    let mut slots = super::world::tdma();
+    let clock = clock_of(&slots, 1);
+    assert_eq!(clock.slot_every_ns, 16 * CYCLE);
+    assert_eq!(clock.asks_every_ns, 16 * CYCLE, "a master has it");
+    assert_eq!(clock.hello_every_ns, 16 * CYCLE, "node 2 has another one in each third cycle");
+    let mut slots = tdma();
     slots.slots.iter_mut().filter(|slot| slot.node == 2).for_each(|slot| slot.period = 32);
-    let asks =
-        |own| crate::tdma::SlotTable::new(&slots, &MASTERS, own, 3, super::world::HEADS).for_clock().asks_every_ns;
+    let asks = |own| clock_of(&slots, own).asks_every_ns;
     assert!(!MASTERS.contains(&2) && asks(1) < asks(2), "the others wait for nobody's rare slots");
     assert_eq!(asks(2), 32 * CYCLE);
 }
@@ -279,18 +279,7 @@ fn a_node_that_knows_the_time_ignores_unverified_frames_as_it_does_those_without
     }
     ear.overhears().unwrap();
     let (sent_ns, term) = (ear.now_ns, Term::new(1, 0));
-    let sync = Sync { id: 99, cycle: 1, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
-    let head = FrameHead {
-        kind: TimeMessage::Sync(sync).kind(),
-        system: 1,
-        from: 0,
-        to: 2,
-        digest: 7,
-        incarnation: 5,
-        sequence: 99,
-    };
-    let came = Stamp { ns: ear.now_ns, doubt_ns: 0, by_kernel: true };
-    ear.clock.handle(ear.now_ns, came, &head, &TimeMessage::Sync(sync).to_bytes()).unwrap();
+    ear.hears(sync(99, 1, sent_ns, term));
     assert!(!ear.clock.overhears(ear.now_ns));
     assert_eq!(ear.overhears(), Err(Ignored::Unproven), "it hears a master that lives");
 }

@@ -1,11 +1,11 @@
 //! One node, and a master made of plain messages: exact to the nanosecond.
 
-use super::world::{CYCLE, MASTERS, SECOND, US, table};
+use super::world::{CYCLE, MASTERS, SECOND, US, table, tdma};
 use crate::frame::{FrameHead, FrameKind as Frame};
+use crate::harness::{time_frame, time_settings};
 use crate::tdma::{Carries, GATE_NS, LATE_NS, Next, Planned, Silent, SlotScheduler, WindowVerdict};
 use crate::time::message::{Reply, Sync, TimeMessage};
-use crate::time::{Allowed, Clock, Stamp, Step, TIME_BYTES, Term, TimeSettings};
-use std::time::Duration;
+use crate::time::{Allowed, Clock, Stamp, Step, TIME_BYTES, Term};
 
 /// Its clock shows this much less than system time.
 const OFFSET: u64 = 1_000 * SECOND;
@@ -22,15 +22,7 @@ struct Lonely {
 
 impl Lonely {
     fn new() -> Self {
-        let settings = TimeSettings {
-            system: 1,
-            own: 2,
-            nodes: 3,
-            masters: MASTERS.to_vec(),
-            interval: Duration::from_nanos(CYCLE),
-            digest: 7,
-            incarnation: 9,
-        };
+        let settings = time_settings(2, &MASTERS, tdma().cycle);
         let now_ns = 10 * SECOND;
         let table = table(2);
         let clock = Clock::new(settings, now_ns, 0, None).in_slots(table.for_clock());
@@ -38,10 +30,9 @@ impl Lonely {
     }
 
     fn hears(&mut self, from: u8, at_ns: u64, message: &TimeMessage) {
-        let head =
-            FrameHead { kind: message.kind(), system: 1, from, to: 2, digest: 7, incarnation: 5, sequence: self.id };
+        let (head, rest) = time_frame((from, 2), self.id, message);
         let came = Stamp { ns: at_ns, doubt_ns: 0, by_kernel: true };
-        self.clock.handle(at_ns, came, &head, &message.to_bytes()).unwrap();
+        self.clock.handle(at_ns, came, &head, &rest).unwrap();
     }
 
     fn sync(&self, sent_ns: u64) -> Sync {

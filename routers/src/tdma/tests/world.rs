@@ -2,7 +2,7 @@
 //! world knows what was on the wire when, and whether two frames were at once.
 
 use crate::frame::{FrameHead, NodeIndex};
-use crate::harness::settings;
+use crate::harness::{self, settings, slot, time_settings};
 use crate::stats::Stats;
 use crate::tdma::{Carries, Next, Planned, Silent, SlotCounts, SlotScheduler, SlotTable, WindowKind, WindowVerdict};
 use crate::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
@@ -12,7 +12,6 @@ use rohrpost_mailbox::TimeRecord;
 use rohrpost_network::{Tdma, TimeSlot};
 use rohrpost_testbed::sim::clock::Clock as Hardware;
 use std::collections::VecDeque;
-use std::time::Duration;
 
 pub(super) const US: u64 = 1_000;
 pub(super) const MS: u64 = 1_000_000;
@@ -25,26 +24,13 @@ const DATAGRAM_BYTES: usize = 600;
 
 /// Three nodes, of which the first two may be master, with a slot in each cycle; node 2 has another in every third.
 pub(super) fn tdma() -> Tdma {
-    let slot = |node, offset_us, length_us, period, phase| TimeSlot {
-        node,
-        offset: Duration::from_micros(offset_us),
-        length: Duration::from_micros(length_us),
-        period,
-        phase,
-    };
-    Tdma {
-        cycle: Duration::from_nanos(CYCLE),
-        synchronisation: Duration::from_micros(300),
-        guard: Duration::from_micros(150),
-        link_bytes_s: 12_500_000,
-        slots: vec![
-            slot(0, 600, 500, 1, 0),
-            slot(1, 1_100, 500, 1, 0),
-            slot(2, 1_600, 500, 1, 0),
-            slot(2, 3_000, 400, 3, 1),
-        ],
-        tunnel: None,
-    }
+    let slots = vec![
+        slot(0, 600, 500),
+        slot(1, 1_100, 500),
+        slot(2, 1_600, 500),
+        TimeSlot { period: 3, phase: 1, ..slot(2, 3_000, 400) },
+    ];
+    Tdma { link_bytes_s: 12_500_000, ..harness::tdma([5_000, 300, 150], slots) }
 }
 
 pub(super) const MASTERS: [NodeIndex; 2] = [0, 1];
@@ -153,15 +139,8 @@ impl World {
     pub(super) fn start(&mut self, node: NodeIndex) {
         let incarnation = self.random.random_range(1..u64::MAX);
         let file = &self.nodes[usize::from(node)].file;
-        let settings = TimeSettings {
-            system: 1,
-            own: node,
-            nodes: 3,
-            masters: file.masters.clone(),
-            interval: file.tdma.cycle,
-            digest: file.digest,
-            incarnation,
-        };
+        let settings = time_settings(node, &file.masters, file.tdma.cycle);
+        let settings = TimeSettings { digest: file.digest, incarnation, ..settings };
         let wall_ns = WALL_NS + self.random.random_range(0..SECOND) + self.now;
         let one = &mut self.nodes[usize::from(node)];
         let table = one.file.table(node);

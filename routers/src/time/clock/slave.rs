@@ -6,7 +6,7 @@ use crate::time::clock_model::{EVEN_PPB, wander_ns_s};
 use crate::time::election::{ElectionState, Followed, SyncOutcome};
 use crate::time::history::{Estimate, OffsetSample};
 use crate::time::message::{Reply, Request, Sync};
-use crate::time::{Exchange, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
+use crate::time::{Exchanges, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
 
 /// Samples that a slave needs before it trusts them, and before it is content.
 const SAMPLES_MIN: u32 = 4;
@@ -51,9 +51,8 @@ impl Clock {
             return Ok(());
         }
         self.asked_ns = received.ns;
-        let exchange = Exchange { id: sync.id, sync_sent_ns: sync.sent_ns, sync_came: received, ..Exchange::default() };
         self.asked.rotate_right(1);
-        self.asked[0] = PendingExchange { exchange, ..PendingExchange::default() };
+        self.asked[0] = PendingExchange { id: sync.id, sync_came: received, ..PendingExchange::default() };
         // The newest question is enough when several Syncs came at once.
         self.drafts.clear();
         self.drafts.push_back((head.from, Draft::WarmUp));
@@ -73,19 +72,14 @@ impl Clock {
             return Err(Ignored::Unasked);
         }
         let mut asked = self.asked.iter_mut();
-        let asked = asked.find(|asked| asked.exchange.id == reply.id && asked.exchange.request_sent_ns != 0);
-        let mut exchange = asked.map(std::mem::take).ok_or(Ignored::Unasked)?.exchange;
-        exchange.sync_left_ns = reply.sync_ns;
-        exchange.request_came_ns = reply.request_ns;
-        (exchange.reply_sent_ns, exchange.reply_came) = (reply.sent_ns, received);
-        let master_by_kernel = reply.sync_by_kernel && reply.request_by_kernel;
-        exchange.by_kernel = master_by_kernel && exchange.sync_came.by_kernel && exchange.request_left.by_kernel;
+        let asked = asked.find(|asked| asked.id == reply.id && asked.request_sent_ns != 0);
+        let asked = asked.map(std::mem::take).ok_or(Ignored::Unasked)?;
         self.election.reply(reply.epoch, reply.error_ns, received.ns);
         self.hears(head.from, head.incarnation, received.ns);
-        let doubt_ns = exchange.sync_came.doubt_ns.max(exchange.request_left.doubt_ns);
-        let sample =
-            sample(&exchange, u64::from(doubt_ns) + u64::from(reply.doubt_ns)).ok_or(Ignored::NegativeDelay)?;
-        self.last = Some(exchange);
+        let sample = sample(&asked, reply).ok_or(Ignored::NegativeDelay)?;
+        let stamped = [reply.sync_by_kernel, reply.request_by_kernel];
+        let by_kernel = stamped == [true; 2] && asked.sync_came.by_kernel && asked.request_left.by_kernel;
+        self.exchanges = Exchanges { count: self.exchanges.count + 1, by_kernel };
         self.history.add(sample);
         if self.history.samples() >= SAMPLES_MIN {
             self.scheduler(now_ns, sample);
@@ -97,7 +91,6 @@ impl Clock {
     pub(super) fn scheduler(&mut self, now_ns: u64, newest: OffsetSample) {
         let ElectionState::Slave(master) = self.election.state() else { return };
         let Some(estimate) = self.history.estimate(now_ns, self.usual_rate) else {
-            self.contradictions += 1;
             self.forget();
             self.history.add(newest);
             return;
@@ -187,9 +180,9 @@ impl Clock {
 
     pub(super) fn write_request(&mut self, now_ns: u64, id: u64, sequence: u64) -> Option<Request> {
         if id != 0 {
-            let asked = self.asked.iter_mut().find(|asked| asked.exchange.id == id)?;
+            let asked = self.asked.iter_mut().find(|asked| asked.id == id)?;
             asked.sequence = sequence;
-            (asked.exchange.request_sent_ns, asked.exchange.request_left) = (now_ns, Stamp::by_us(now_ns));
+            (asked.request_sent_ns, asked.request_left) = (now_ns, Stamp::by_us(now_ns));
         }
         let told = if id == 0 { self.sure(now_ns) } else { None };
         Some(Request {
@@ -207,16 +200,18 @@ impl Clock {
 
 /// The interval that an exchange leaves for `system − local` when the Request left. None when the frames took negative
 /// time.
-fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<OffsetSample> {
-    let (came_ns, left_ns) = (exchange.sync_came.ns, exchange.request_left.ns);
+fn sample(asked: &PendingExchange, reply: &Reply) -> Option<OffsetSample> {
+    let PendingExchange { sync_came, request_left, .. } = asked;
+    let (came_ns, left_ns) = (sync_came.ns, request_left.ns);
     let waited_ns = left_ns.checked_sub(came_ns)?;
-    let low_ns = exchange.sync_left_ns.wrapping_sub(came_ns).cast_signed();
-    let high_ns = exchange.request_came_ns.wrapping_sub(left_ns).cast_signed();
+    let low_ns = reply.sync_ns.wrapping_sub(came_ns).cast_signed();
+    let high_ns = reply.request_ns.wrapping_sub(left_ns).cast_signed();
     if high_ns <= low_ns {
         return None;
     }
     // Between both stamps of this node its clock drifted; the master's are whole numbers.
     let drifted_ns = u128::from(waited_ns) * RATE_MAX_PPB as u128 / 1_000_000_000;
+    let doubt_ns = u64::from(sync_came.doubt_ns.max(request_left.doubt_ns)) + u64::from(reply.doubt_ns);
     let doubt_ns = doubt_ns.saturating_add(drifted_ns as u64).saturating_add(2).cast_signed();
     Some(OffsetSample {
         local_ns: left_ns,

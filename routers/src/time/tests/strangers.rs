@@ -1,6 +1,7 @@
 //! Hostile datagrams: they are refused, or change nothing that a module could notice.
 
 use crate::frame::{FrameHead, FrameKind};
+use crate::harness::time_settings;
 use crate::time::message::{MESSAGE_BYTES, Reply, Request, Sync, TimeMessage};
 use crate::time::{Allowed, Clock, InSlots, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use proptest::prelude::*;
@@ -9,15 +10,7 @@ use std::time::Duration;
 const KINDS: [FrameKind; 4] = [FrameKind::Sync, FrameKind::WarmUp, FrameKind::Request, FrameKind::Reply];
 
 fn settings() -> TimeSettings {
-    TimeSettings {
-        system: 1,
-        own: 1,
-        nodes: 3,
-        masters: vec![0, 1],
-        interval: Duration::from_millis(100),
-        digest: 7,
-        incarnation: 9,
-    }
+    time_settings(1, &[0, 1], Duration::from_millis(100))
 }
 
 fn head(kind: FrameKind, from: u8) -> FrameHead {

@@ -2,6 +2,7 @@
 //! every node's page at every moment against the promises of the module.
 
 use crate::frame::{FrameHead, NodeIndex};
+use crate::harness::time_settings;
 use crate::time::{Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -103,15 +104,8 @@ impl World {
         let wall_ns = WALL_NS + self.random.random_range(0..100 * SECOND) + at;
         let one = &mut self.nodes[usize::from(node)];
         one.incarnation = incarnation;
-        let settings = TimeSettings {
-            system: 1,
-            own: node,
-            nodes: self.cut.len() as u8,
-            masters: self.masters.clone(),
-            interval: self.interval,
-            digest: 7,
-            incarnation,
-        };
+        let settings = time_settings(node, &self.masters, self.interval);
+        let settings = TimeSettings { nodes: self.cut.len() as u8, incarnation, ..settings };
         let clock = Clock::new(settings, one.oscillator.local_ns(at), wall_ns, one.page);
         one.clock = Some(clock);
         self.wake(node, at);

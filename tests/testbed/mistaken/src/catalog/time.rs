@@ -12,8 +12,8 @@ pub(crate) const TIME: Group = Group {
             shows_in: "time::tests::promises_hold_in_every_scene",
             edits: &[edit(
                 "time/clock/slave.rs",
-                "asked.find(|asked| asked.exchange.id == reply.id &&",
-                "asked.find(|asked| (asked.exchange.id == reply.id || broken!(AnyReply)) &&",
+                "asked.find(|asked| asked.id == reply.id &&",
+                "asked.find(|asked| (asked.id == reply.id || broken!(AnyReply)) &&",
             )],
         },
         Planted {

@@ -5,9 +5,7 @@ use crate::sim::clock::Now;
 use crate::sim::promise::Promise;
 use crate::sim::station::{Arrived, Io, Layer, Port};
 use rohrpost_mailbox::Priority;
-use rohrpost_routers::driver::{
-    FreeDriver, FreeStep, Handover, Inlet, NotSent, Nowhere, Outlet, RealTimeOutlet, Wakes,
-};
+use rohrpost_routers::driver::{FreeDriver, FreeStep, Inlet, NotSent, Outlet, Wakes};
 use rohrpost_routers::frame::{HEAD_BYTES, NodeIndex};
 use rohrpost_routers::outbound::{Outbound, Package};
 use rohrpost_routers::report::Report;
@@ -88,12 +86,6 @@ impl Outlet for FreeSystem<'_, '_> {
 
     fn deliver(&mut self, _: u64) -> u64 {
         u64::MAX
-    }
-}
-
-impl RealTimeOutlet for FreeSystem<'_, '_> {
-    fn rest(&mut self) -> Option<&mut impl Handover> {
-        None::<&mut Nowhere>
     }
 }
 

@@ -4,7 +4,7 @@ use super::leaving::{Leaving, NoPackages};
 use super::{NodeTime, Replicas};
 use crate::sim::clock::Now;
 use crate::sim::station::{Arrived, Io, Layer, Port};
-use rohrpost_routers::driver::{NotSent, Outlet, ReplicaDriver, ReplicaWait};
+use rohrpost_routers::driver::{NotSent, Outlet, OutletStep, ReplicaDriver};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::outbound::Outbound;
 use rohrpost_routers::report::Report;
@@ -80,12 +80,12 @@ impl FreeReplicas {
         let system = |real_ns| time.at(rings.simulated_ns(real_ns));
         let for_ns = loop {
             match self.driver.poll(&mut PartSystem { leaving, io }, system, sender) {
-                ReplicaWait::Again => {}
-                ReplicaWait::Sleep { for_ns } => {
+                OutletStep::Again => {}
+                OutletStep::Sleep { for_ns } => {
                     self.is_deaf = true;
                     break for_ns;
                 }
-                ReplicaWait::Wait { for_ns } => {
+                OutletStep::Wait { for_ns } => {
                     self.is_deaf = false;
                     break for_ns;
                 }

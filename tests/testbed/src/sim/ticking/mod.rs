@@ -11,7 +11,7 @@ use super::station::{Arrived, Io, Layer, Port, STRANGER, Sent};
 use super::times::Left;
 use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, Watched};
 use rohrpost_routers::driver::{
-    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeStart,
+    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeEvent, TimeInput, TimePlatform, TimeStart,
 };
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::security::PeerSessions;
@@ -140,7 +140,7 @@ impl TimePlatform for TimeSystem<'_, '_> {
 
     fn note_watched(&mut self, _: &Watched) {}
 
-    fn publish(&mut self, clock: &Clock, _: TimeCounts) {
+    fn publish(&mut self, clock: &Clock, _: u64) {
         self.watch.publishes(self.io, clock);
     }
 

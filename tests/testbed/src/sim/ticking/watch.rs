@@ -140,7 +140,6 @@ impl TimeWatch {
                 self.hears(io, clock, (source, taken == Some(Ok(()))), head, rest);
                 self.look(io, clock);
             }
-            TimeEvent::Measured(_) => {}
             TimeEvent::Sends(datagram) => {
                 self.look(io, clock);
                 self.sends(io, datagram);
