@@ -10,9 +10,9 @@
 //! ends the build as soon as it has another parent: the demo has ended, however that came. It prints nothing into the
 //! demo's terminal. All goes to a file, the last line of which says how far it is; the demo shows that line.
 
+use crate::Failure;
 use crate::cargo::{self, BRIDGE};
 use crate::crates::{self, Added, Crates, JSON};
-use crate::failure::Failure;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, parent_id};

@@ -1,6 +1,6 @@
 //! Paths, and calls of other programs.
 
-use crate::failure::Failure;
+use crate::Failure;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::sync::OnceLock;

@@ -5,9 +5,8 @@ mod filter;
 mod levels;
 mod reader;
 mod recorded;
-mod show;
 
-use crate::terminal::Failure;
+use crate::terminal::{Failure, complain, say, say_folded};
 pub(crate) use arguments::Arguments;
 use filter::Filter;
 use levels::Setting;
@@ -18,7 +17,6 @@ use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
 use rohrpost::output::OutputLine;
 use rohrpost_builtin::format::Format;
-use show::Show;
 use std::collections::VecDeque;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -110,5 +108,28 @@ impl Show<'_> {
                 return Ok(true);
             }
         }
+    }
+}
+
+/// The selected lines and their format.
+struct Show<'a> {
+    filter: Filter,
+    format: Format<'a>,
+    arguments: &'a Arguments,
+}
+
+impl Show<'_> {
+    /// False when nobody reads any more.
+    fn line(&self, line: &OutputLine) -> bool {
+        if self.arguments.json { say(self.format.json(line)) } else { say_folded(self.format.short(line)) }
+    }
+
+    /// A notice of the tool between the lines; programs get only lines.
+    fn note(&self, note: &str) -> bool {
+        if self.arguments.json {
+            complain(format_args!("… {note}"));
+            return true;
+        }
+        say_folded(format_args!("… {note}"))
     }
 }

@@ -1,8 +1,7 @@
 //! `rohrpost check`, and reading a configuration with every check that is possible before anything runs.
 
 mod json;
-mod memory;
-mod recorded;
+mod notes;
 
 use crate::computer::doctor;
 use crate::daemons;
@@ -67,11 +66,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let missing = missing_programs(&installation, only)?;
     let mut notes = separated_by_size(&installation);
-    notes.extend(recorded::too_large(&installation));
+    notes.extend(notes::records_too_large(&installation));
     notes.extend(daemons_here(&installation, Path::new("/proc")));
     let base = base_directory();
     let room = doctor::room_of_nodes(&base);
-    notes.extend(room.into_iter().flat_map(|room| memory::too_small(&installation, only, &base, room)));
+    notes.extend(room.into_iter().flat_map(|room| notes::too_small(&installation, only, &base, room)));
     if arguments.json {
         say(json::installation(&installation, only, &missing, &notes));
         return Ok(ExitCode::SUCCESS);

@@ -3,8 +3,7 @@
 //! A thread observes the bridge and the nodes' tables. It sends nothing, so it adds no traffic.
 
 use super::incarnations::{Death, Incarnations};
-use super::masters::{MasterTerm, Masters};
-use super::sealed_capture::SealedCapture;
+use super::masters::{MasterTerm, Masters, SealedCapture};
 use crate::terminal::Failure;
 use crate::terminal::table::time;
 use rohrpost_config::Installation;

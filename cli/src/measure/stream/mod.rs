@@ -9,7 +9,6 @@ mod between;
 mod choice;
 mod interp;
 mod list;
-mod moment;
 mod output;
 mod read;
 mod refusal;

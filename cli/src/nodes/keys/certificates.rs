@@ -1,23 +1,20 @@
 //! The certificates of the TCP router and of a system's nodes: sessions are sealed, and each end proves its identity.
 
-mod error;
 mod shown;
 mod written;
 
-use error::CertificateError;
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose,
     date_time_ymd,
 };
-use rohrpost_config::{Installation, open_secret};
+use rohrpost_config::{Installation, KeysError, open_secret};
 use rohrpost_mailbox::realtime_ns;
-use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, is_about};
+use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, SealError, is_about};
 pub(crate) use shown::lacking;
 pub(super) use shown::show;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use std::{fs, io};
 use written::{PUBLIC, SECRET, Written};
 
 pub(super) const DAY: Duration = Duration::from_secs(24 * 3600);
@@ -226,4 +223,36 @@ fn issue(
 fn hold(params: &mut CertificateParams, days: u32) {
     let now = date_time_ymd(1970, 1, 1) + Duration::from_nanos(realtime_ns());
     (params.not_before, params.not_after) = (now - BEFORE, now + days * DAY);
+}
+
+/// Why certificates cannot be made or read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CertificateError {
+    /// A file.
+    #[error("{0}: {1}")]
+    File(PathBuf, io::Error),
+    /// Other users may read a key.
+    #[error(transparent)]
+    Open(#[from] KeysError),
+    /// The certificate of the authority.
+    #[error(transparent)]
+    Authority(#[from] SealError),
+    /// Only half of the authority is there.
+    #[error(
+        "{certificate} is there, and {secret} is not: without it nothing can be signed. Bring it from where the \
+         authority was made; if it is lost, `rohrpost keys rotate --authority {file}` begins anew, and then the same \
+         without `--authority` for each other system of the installation",
+        certificate = .0.display(), secret = .1.display(), file = .2.display()
+    )]
+    NoKey(PathBuf, PathBuf, PathBuf),
+    /// Key and certificate belong to different authorities.
+    #[error(
+        "{secret} is not the key of {certificate}: they are of two authorities. Bring both from where one of them was \
+         made, or `rohrpost keys rotate --authority {file}` begins anew",
+        certificate = .0.display(), secret = .1.display(), file = .2.display()
+    )]
+    OtherKey(PathBuf, PathBuf, PathBuf),
+    /// A file holds no valid key, or a certificate cannot be made.
+    #[error("{0}: {1}")]
+    Unfit(PathBuf, rcgen::Error),
 }

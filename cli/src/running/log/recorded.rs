@@ -1,8 +1,8 @@
 //! Lines of output from recordings: always the one that arrived first of those that are next in their files.
 
+use super::Show;
 use super::arguments::Arguments;
 use super::filter::Filter;
-use super::show::Show;
 use crate::look::{parse_name, unknown_module};
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;

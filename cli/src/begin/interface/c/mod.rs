@@ -2,7 +2,6 @@
 //! the hash and the description's bytes. The header includes nothing but the standard's headers; what all interfaces
 //! need of postcard (`postcard.h`) stands in each, and counts once.
 
-mod ctype;
 mod functions;
 mod types;
 

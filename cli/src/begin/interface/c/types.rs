@@ -4,8 +4,7 @@ use super::super::blueprint::{Blueprint, Body, Inside, Layout, TypedField};
 use super::super::names::{Scope, is_plain, last, snake};
 use super::super::refusal::{Refusal, RefusedFor};
 use super::super::texts::{of_field, one_line};
-use super::ctype::{CType, Carried, Member};
-use super::functions;
+use super::functions::{self, CType, Carried, Member};
 use std::collections::HashMap;
 
 /// Bytes that a value may have in C: what somebody puts on a stack.

@@ -1,6 +1,6 @@
 //! Writes files that belong together: all are completely on the disk before the first gets its name.
 
-use super::error::CertificateError;
+use super::CertificateError;
 use rohrpost_config::KeysError;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
