@@ -174,7 +174,7 @@ fn own_functions() -> Vec<CompletionCandidate> {
 }
 
 fn functions() -> Vec<CompletionCandidate> {
-    own_functions().into_iter().chain(COMMON.iter().map(|(name, text)| candidate(*name, text))).collect()
+    own_functions().into_iter().chain(COMMON.iter().map(|(name, text, _)| candidate(*name, text))).collect()
 }
 
 fn data() -> Vec<CompletionCandidate> {

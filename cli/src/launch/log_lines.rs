@@ -1,10 +1,9 @@
 //! `launch --log`: what the modules of a node say, asked of the collector page by page. Nothing here waits for it.
 
-use crate::running::log::LINES_FROM;
+use crate::running::log::{LINES_FROM, collector};
 use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
-use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost_builtin::format::Format;
 use rohrpost_config::Installation;
@@ -34,9 +33,8 @@ impl LogLines {
     /// # Errors
     /// When nobody collects what modules say.
     pub(super) fn new(installation: &Installation, node: &str, least: OutputLevel) -> Result<Self, Failure> {
-        let class = installation.classes.id(CollectorInterface::CLASS);
-        let collector = class.map(|class| Name::new(installation.system.id, class.0, 0, 0));
-        let collector = collector.filter(|name| installation.module(*name).is_some()).ok_or_else(|| {
+        let collector = collector(installation).filter(|name| installation.module(*name).is_some());
+        let collector = collector.ok_or_else(|| {
             format!(
                 "--log shows what the collector of output has, and {} has none; add a module with `builtin \
                  = \"output\"`",

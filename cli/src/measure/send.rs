@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// Why there is nothing to send. Functions that every module has, such as `off`, need no repetition.
 fn no_function(arguments: &Arguments, name: &str, description: &Description) -> String {
     let function = &arguments.function;
-    if COMMON.iter().any(|(common, _)| common == function) {
+    if COMMON.iter().any(|(common, ..)| common == function) {
         return format!("`{function}` needs no repetition: `rohrpost call {name} {function}`");
     }
     match &names(description)[..] {

@@ -1,20 +1,16 @@
 //! `rohrpost log`: shows the output of modules, also of recordings, and sets its level.
 
 mod arguments;
-mod filter;
 mod levels;
 mod reader;
 mod recorded;
 
 use crate::terminal::{Failure, complain, say, say_folded};
 pub(crate) use arguments::Arguments;
-use filter::Filter;
+use arguments::Filter;
 use levels::Setting;
-pub(crate) use reader::LINES_FROM;
 use reader::Reader;
-use rohrpost::Name;
-use rohrpost::interface::Interface;
-use rohrpost::interfaces::CollectorInterface;
+pub(crate) use reader::{LINES_FROM, collector};
 use rohrpost::output::OutputLine;
 use rohrpost_builtin::format::Format;
 use std::collections::VecDeque;
@@ -29,9 +25,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return recorded::run(arguments);
     }
     let running = arguments.target.find()?;
-    let class = running.installation.classes.id(CollectorInterface::CLASS);
-    let class = class.ok_or("the configuration has no class `output`, so nobody collects output")?;
-    let collector = Name::new(running.installation.system.id, class.0, 0, 0);
+    let collector = collector(&running.installation);
+    let collector = collector.ok_or("the configuration has no class `output`, so nobody collects output")?;
     let (settings, mut filter) = Filter::read(arguments, &running.installation, &|text| running.module(text))?;
     let settings: Vec<Setting> =
         settings.iter().map(|(name, level)| Setting::read(name, level, &running)).collect::<Result<_, _>>()?;

@@ -8,18 +8,19 @@ use super::replicas::RecordBalance;
 use super::takeover::{TakeoverRecord, Victim, Watch};
 use super::{FIRST_FUNCTION, beyond, copy, map_line, running};
 use crate::launch::{LaunchedNodes, lab};
+use crate::look::newest;
 use crate::look::summary::print_classes;
 use crate::nodes::vocabulary::Vocabulary;
-use crate::nodes::{carried, flows, slots};
+use crate::nodes::{flows, slots};
 use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, say};
-use rohrpost::common::{GET_DATA, State};
+use rohrpost::ToolLink;
+use rohrpost::common::State;
 use rohrpost::interface::{DataPort, Interface};
 use rohrpost::interfaces::{
     CartographerInterface, FlowStates, Links, MapCounts, ReplicaStates, RouterInterface, SlotState,
 };
-use rohrpost::wire::{append, from_bytes};
-use rohrpost::{CallError, ToolLink};
+use rohrpost::wire::from_bytes;
 use rohrpost_config::Installation;
 use rohrpost_launch::survey::Survey;
 use rohrpost_mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
@@ -136,7 +137,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
         text += &format!("{error}\n");
     }
     text += "\nOver the network; age: from the stamp of data to the mailbox on the other node:\n\n";
-    text += &carried::by_class(installation, &links, |_| true);
+    text += &slots::by_class(installation, &links, |_| true);
     let replicas = records.table();
     if !replicas.is_empty() {
         text += "\nStreams by replicas; delay: from writing to the arrival of the whole record:\n\n";
@@ -293,9 +294,6 @@ fn of_router<T: DeserializeOwned>(
     data: DataPort<T>,
 ) -> Result<T, Failure> {
     let router = installation.router_of(node).ok_or("no router")?;
-    let write = |body: &mut Vec<u8>| append(body, &(data.number,));
-    let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
-    let answer = tool.call(router, GET_DATA, RouterInterface::hash(), write, read);
-    let told = |error: CallError| format!("router of {node}: {error}");
-    Ok(answer.map(|(_, told)| told).map_err(told)?)
+    let (_, told) = newest(tool, router, data).map_err(|error| format!("router of {node}: {error}"))?;
+    Ok(told)
 }

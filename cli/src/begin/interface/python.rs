@@ -2,11 +2,10 @@
 //! classes for its types. The module compares its hash with the file's when it is imported.
 
 use super::blueprint::{Blueprint, Body, Inside, Layout, NamedType, Operation, Published, TypedField, Variant};
-use super::names::{Scope, camel, is_plain, last, snake};
-use super::refusal::{Refusal, RefusedFor};
-use super::standard;
-use super::texts::{in_docstring, one_line, python_literal, wrapped};
-use rohrpost::schema::{DataKind, Field, Value};
+use super::names::{Scope, camel, is_plain, last, snake, standard_name};
+use super::refusal::{Refusal, cannot};
+use super::texts::{in_docstring, literal, one_line, python_literal, wrapped};
+use rohrpost::schema::{DataKind, Field};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
@@ -80,10 +79,6 @@ struct PythonCode<'a> {
     classes: RefCell<Scope>,
 }
 
-fn cannot(place: &str, what: impl Into<String>, instead: &'static str) -> Refusal {
-    RefusedFor::Language { language: "Python", what: what.into(), instead }.at(place)
-}
-
 /// A name that Python can have, near to this one; names that begin with two `_` mean something else inside of a class.
 fn near(name: &str, more: &str, other: &str) -> String {
     let plain = is_plain(name) && !name.starts_with('_');
@@ -98,7 +93,7 @@ impl<'a> PythonCode<'a> {
         let name = scope.give(&camel(blueprint.name, "Interface"), "");
         let (mut names, mut there) = (Vec::new(), Vec::new());
         for named in &blueprint.types {
-            let standard = standard::name(named.ty, named.name).filter(|name| STANDARD.contains(name));
+            let standard = standard_name(named.ty, named.name).filter(|name| STANDARD.contains(name));
             there.push(standard.is_some());
             let own = || scope.give(&camel(last(named.name), "Type"), "");
             names.push(standard.map_or_else(own, |name| format!("rp.{name}")));
@@ -201,7 +196,12 @@ impl<'a> PythonCode<'a> {
         known: &str,
     ) -> Result<String, Refusal> {
         if parts.is_empty() {
-            return Err(cannot(name, "named fields of which there are none", "give it a field, or none without names"));
+            return Err(cannot(
+                "Python",
+                name,
+                "named fields of which there are none",
+                "give it a field, or none without names",
+            ));
         }
         let mut code = format!("{}\nclass {own}:\n", decorated(known));
         code += &docstring("    ", text).map_or(String::new(), |text| text + "\n");
@@ -384,14 +384,4 @@ fn said(field: &Field, name: &str) -> String {
     let bounds = bounds.into_iter().filter_map(|(key, bound)| Some(format!("{key}={}", bound?)));
     words.extend(bounds);
     words.join(", ")
-}
-
-/// A bound in Python; those that are no numbers stay away.
-fn literal(value: &Value) -> Option<String> {
-    match value {
-        Value::U(number) => Some(number.to_string()),
-        Value::I(number) => Some(number.to_string()),
-        Value::F(number) if number.is_finite() => Some(format!("{number:?}")),
-        _ => None,
-    }
 }

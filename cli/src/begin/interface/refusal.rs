@@ -38,6 +38,11 @@ pub(super) enum RefusedFor {
     Language { language: &'static str, what: String, instead: &'static str },
 }
 
+/// What a language cannot have at a place, and what to take instead.
+pub(super) fn cannot(language: &'static str, place: &str, what: impl Into<String>, instead: &'static str) -> Refusal {
+    RefusedFor::Language { language, what: what.into(), instead }.at(place)
+}
+
 impl RefusedFor {
     pub(super) fn at(self, place: impl Into<String>) -> Refusal {
         Refusal { place: place.into(), problem: self }

@@ -3,10 +3,10 @@
 use super::beyond;
 use super::node_report::NodeReport;
 use crate::look::target::Running;
+use crate::nodes::flows;
 use crate::nodes::quantities::counted;
-use crate::nodes::slots::kept;
+use crate::nodes::slots::{by_class, kept};
 use crate::nodes::vocabulary::Vocabulary;
-use crate::nodes::{carried, flows};
 use crate::terminal::table::{table, time};
 use crate::terminal::units::{bytes, fine};
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected, ReplicaState};
@@ -153,7 +153,7 @@ fn waiting(all: &[NodeReport]) -> String {
 /// Classes with losses; the others are in the JSON.
 fn losses(running: &Running, all: &[NodeReport]) -> String {
     let links = all.iter().filter_map(|told| told.links.as_ref());
-    carried::by_class(&running.installation, links, |class| !class.lost.is_empty())
+    by_class(&running.installation, links, |class| !class.lost.is_empty())
 }
 
 /// Declared flows; empty if there is none.

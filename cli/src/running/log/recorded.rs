@@ -1,8 +1,7 @@
 //! Lines of output from recordings: always the one that arrived first of those that are next in their files.
 
 use super::Show;
-use super::arguments::Arguments;
-use super::filter::Filter;
+use super::arguments::{Arguments, Filter};
 use crate::look::{parse_name, unknown_module};
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;

@@ -32,10 +32,10 @@ enum Purpose {
 
 /// The result of a call.
 pub(super) enum Answer {
-    Switched(Name, bool, Result<(), String>),
+    /// What came of a key.
+    Done(String),
     Lines(Result<Page, String>),
     Why(Name, String),
-    Restarted(Name, Result<(), String>),
     /// Another node's report, or why it does not answer.
     Snapshot(String, Result<Survey, Silence>),
 }
@@ -154,14 +154,17 @@ impl Calls {
     fn answer(&mut self, running: &Running, to: Name, purpose: Purpose, bytes: &[u8]) -> Option<Answer> {
         let unread = |error: &dyn std::fmt::Display| CallError::BadReply(to, error.to_string());
         match purpose {
-            Purpose::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
+            Purpose::Switch(on) => {
+                Some(Answer::Done(format!("{} is {}", running.text(to), if on { "on" } else { "off" })))
+            }
             Purpose::Lines => match from_bytes::<Page>(bytes) {
                 Ok(page) => Some(Answer::Lines(Ok(page))),
                 Err(error) => failed(running, to, purpose, &unread(&error)),
             },
             Purpose::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
             Purpose::Restart(module) => match from_bytes::<Result<u32, ControlError>>(bytes) {
-                Ok(outcome) => Some(Answer::Restarted(module, outcome.map(|_| ()).map_err(|error| error.to_string()))),
+                Ok(Ok(_)) => Some(Answer::Done(format!("{} is being restarted", running.text(module)))),
+                Ok(Err(error)) => Some(Answer::Done(error.to_string())),
                 Err(error) => failed(running, to, purpose, &unread(&error)),
             },
         }
@@ -179,9 +182,8 @@ fn failed(running: &Running, to: Name, purpose: Purpose, error: &CallError) -> O
         error => error.to_string().replace(&to.to_string(), &asked),
     };
     match purpose {
-        Purpose::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
+        Purpose::Switch(_) | Purpose::Restart(_) => Some(Answer::Done(told)),
         Purpose::Lines => Some(Answer::Lines(Err(told))),
-        Purpose::Restart(module) => Some(Answer::Restarted(module, Err(told))),
         Purpose::Why => None,
     }
 }

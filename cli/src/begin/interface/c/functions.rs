@@ -20,23 +20,7 @@ impl CType {
     pub(super) fn write(&self, place: &str) -> String {
         match self.word {
             Some(word) => format!("rp_pack_{word}(to, {place});"),
-            None => format!("{}_write(to, &{place});", self.name),
-        }
-    }
-
-    /// A statement that writes what `value` points to.
-    pub(super) fn write_all(&self) -> String {
-        match self.word {
-            Some(word) => format!("rp_pack_{word}(to, *value);"),
-            None => format!("{}_write(to, value);", self.name),
-        }
-    }
-
-    /// A statement that reads what `value` points to.
-    pub(super) fn read_all(&self) -> String {
-        match self.word {
-            Some(word) => format!("*value = rp_unpack_{word}(from);"),
-            None => format!("{}_read(from, value);", self.name),
+            None => format!("{}_write(to, {});", self.name, address(place)),
         }
     }
 
@@ -44,7 +28,7 @@ impl CType {
     pub(super) fn read(&self, place: &str) -> String {
         match self.word {
             Some(word) => format!("{place} = rp_unpack_{word}(from);"),
-            None => format!("{}_read(from, &{place});", self.name),
+            None => format!("{}_read(from, {});", self.name, address(place)),
         }
     }
 
@@ -62,6 +46,10 @@ impl CType {
     pub(super) fn short<'a>(&'a self, prefix: &str) -> &'a str {
         self.word.unwrap_or_else(|| self.name.strip_prefix(prefix).unwrap_or(&self.name))
     }
+}
+
+fn address(place: &str) -> String {
+    place.strip_prefix('*').map_or_else(|| format!("&{place}"), str::to_owned)
 }
 
 /// One member of a struct: what it is called, its type, and what is said of it.
@@ -231,8 +219,8 @@ static inline rp_code {name}_decode({inner} *value, const void *bytes, size_t le
 }}
 
 ",
-            write = ty.write_all(),
-            read = ty.read_all()
+            write = ty.write("*value"),
+            read = ty.read("*value")
         ),
     );
 }

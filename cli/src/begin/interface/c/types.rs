@@ -2,7 +2,7 @@
 
 use super::super::blueprint::{Blueprint, Body, Inside, Layout, TypedField};
 use super::super::names::{Scope, is_plain, last, snake};
-use super::super::refusal::{Refusal, RefusedFor};
+use super::super::refusal::{Refusal, cannot};
 use super::super::texts::{of_field, one_line};
 use super::functions::{self, CType, Carried, Member};
 use std::collections::HashMap;
@@ -27,10 +27,6 @@ pub(super) struct CTypes<'a> {
     scope: Scope,
     known: HashMap<Layout, CType>,
     pub(super) code: String,
-}
-
-fn cannot(place: &str, what: impl Into<String>, instead: &'static str) -> Refusal {
-    RefusedFor::Language { language: "C", what: what.into(), instead }.at(place)
 }
 
 /// A name of a member, one of its scope.
@@ -66,7 +62,7 @@ impl<'a> CTypes<'a> {
         let made = self.make(layout, place)?;
         if made.size > SIZE_MAX {
             let what = format!("a value of {} bytes", made.size);
-            return Err(cannot(place, what, "a list has its elements elsewhere; arrays have them in place"));
+            return Err(cannot("C", place, what, "a list has its elements elsewhere; arrays have them in place"));
         }
         self.known.insert(layout.clone(), made.clone());
         Ok(made)
@@ -206,7 +202,7 @@ impl<'a> CTypes<'a> {
                 Ok(self.structure(name, named.text, &members))
             }
             Body::Enum(variants) if variants.is_empty() => {
-                Err(cannot(place, "an enum without variants", "give it one"))
+                Err(cannot("C", place, "an enum without variants", "give it one"))
             }
             Body::Enum(variants) => {
                 // What variants carry stands before the enum.
