@@ -7,6 +7,7 @@ use super::manager::Manager;
 use crate::look::summary::{ModuleLine, module_lines, print_modules_live};
 use crate::running::call::level_of;
 use crate::terminal::speech::Speech;
+use crate::terminal::units::counted;
 use crate::terminal::{Failure, columns, folded, rows};
 pub(super) use all::{LaunchedNodes, lab};
 use log_lines::LogLines;
@@ -160,9 +161,8 @@ impl<'a> TerminalView<'a> {
     fn began(&self, launch: &Launch, node: &str) {
         if !self.live {
             let modules = launch.phases().filter(|(_, phase)| *phase != Phase::LeftOut).count();
-            let word = if modules == 1 { "module" } else { "modules" };
             let runs = all::runs(node, &launch.installation().name);
-            self.speech.say(&format!("{runs}: {modules} {word}"));
+            self.speech.say(&format!("{runs}: {}", counted(modules as u64, "module")));
         }
     }
 

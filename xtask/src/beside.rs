@@ -142,9 +142,7 @@ fn behind(command: &Command) -> Command {
 
 /// What comes from the build.
 enum News {
-    /// A line for people.
     Line(String),
-    /// A line of JSON.
     Json(String),
     /// So many crates are needed.
     Needed(usize),

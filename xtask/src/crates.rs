@@ -11,7 +11,6 @@ use std::process::Stdio;
 /// What makes Cargo print a line of JSON for each thing that it has built, and all else as usual.
 pub(crate) const JSON: &str = "--message-format=json-render-diagnostics";
 
-/// Crates of a build.
 #[derive(Default)]
 pub(crate) struct Crates {
     there: BTreeSet<String>,
@@ -24,7 +23,6 @@ pub(crate) struct Crates {
 pub(crate) enum Added {
     /// Cargo found it: an earlier build made it.
     Found,
-    /// It was compiled.
     Compiled,
 }
 

@@ -10,7 +10,6 @@ use std::process::{Command, ExitCode};
 /// When the GUI bridge is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum BridgeBuild {
-    /// Not at all.
     Never,
     /// Before the robot starts.
     First,

@@ -45,7 +45,6 @@ pub(crate) fn run_all(stages: impl IntoIterator<Item = Stage>) -> ExitCode {
     if outcomes.iter().all(|outcome| outcome.result.is_ok()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Runs a stage.
 fn outcome(stage: Stage) -> Outcome {
     let (began, before) = (Instant::now(), of_ended_children());
     let (parts, result) = (stage.run)();

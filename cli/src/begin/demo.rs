@@ -158,7 +158,6 @@ pub(super) fn running(installation: &Installation, class: &str) -> Option<Name> 
     installation.modules.iter().flat_map(|module| module.names()).find(|name| name.class() == class)
 }
 
-/// The progress of the map.
 pub(super) fn map_line(counts: &MapCounts) -> String {
     let MapCounts { scans, odometries, mapped, without_pose, free, occupied } = counts;
     format!(

@@ -1,6 +1,6 @@
 //! `launch --log`: what the modules of a node say, asked of the collector page by page. Nothing here waits for it.
 
-use crate::running::log::{LINES_FROM, collector};
+use crate::running::log::{LINES_FROM, POLL, collector};
 use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
@@ -9,9 +9,6 @@ use rohrpost_builtin::format::Format;
 use rohrpost_config::Installation;
 use rohrpost_launch::Launch;
 use std::time::{Duration, Instant};
-
-/// New lines are asked for so often.
-const POLL: Duration = Duration::from_millis(200);
 
 /// The lines that come, of this severity and above.
 pub(super) struct LogLines {

@@ -54,7 +54,6 @@ impl Running {
         nodes.iter().map(look).collect()
     }
 
-    /// Observes one node.
     pub(crate) fn look(&self, node: &str, scope: Scope) -> Result<Survey, Failure> {
         match self.look_at(&[node], scope)?.pop() {
             Some(seen) => seen.map_err(|silence| silence.text().into()),
@@ -106,7 +105,6 @@ impl Running {
         self.newest(router, RouterInterface::LINKS).ok()
     }
 
-    /// The newest value of data that a module publishes.
     fn newest<T: DeserializeOwned>(&self, module: Name, port: DataPort<T>) -> Result<T, Failure> {
         let told = self.ask(|tool| newest(tool, module, port))?;
         told.map(|(_, value)| value).map_err(|error| self.told(module, &error))

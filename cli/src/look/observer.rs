@@ -48,7 +48,6 @@ impl Drop for Observer {
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Silence {
     pub(crate) node: String,
-    /// Why, in words.
     pub(crate) why: String,
     /// For how long, as far as it is known.
     pub(crate) silent_s: Option<f64>,

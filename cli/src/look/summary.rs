@@ -40,7 +40,6 @@ pub(crate) struct Account {
     attempt: Option<u32>,
     /// and the number at which launch gives up.
     attempts_max: Option<u32>,
-    /// The last error.
     pub(crate) error: Option<String>,
     pub(crate) restarts: u32,
 }

@@ -69,7 +69,6 @@ struct PartyLine {
     stopped: bool,
 }
 
-/// Counters of one class.
 #[derive(Serialize)]
 struct ClassLine {
     class: String,

@@ -3,7 +3,7 @@
 
 use crate::look::target::{Running, Target};
 use crate::running::call::{COMMON, body_of, names};
-use crate::terminal::units::{Stop, rate, seconds};
+use crate::terminal::units::{LOOK, Stop, rate, seconds};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::output::plain;
 use rohrpost::schema::{Description, Function, Value, decode};
@@ -11,9 +11,6 @@ use rohrpost::{CallError, Name, ToolLink};
 use rohrpost_mailbox::wait_any;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-
-/// Longest sleep without a check for answers and Ctrl-C.
-const LOOK: Duration = Duration::from_millis(50);
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:

@@ -1,6 +1,7 @@
 //! Polls the routers of all nodes one after the other, once or repeatedly: shared by `net` and `time`.
 
 use crate::look::newest;
+use crate::look::observer::PATIENCE;
 use crate::look::target::{Running, Target};
 use crate::terminal::Failure;
 use crate::terminal::units::{Stop, seconds};
@@ -10,9 +11,6 @@ use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::{CallError, Fault, ToolLink};
 use rohrpost_config::Installation;
 use std::time::Duration;
-
-/// A router without an answer after this time is silent.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Which nodes to ask, and how often.
 #[derive(clap::Args)]
@@ -75,7 +73,6 @@ impl Round {
         })
     }
 
-    /// The link that asks.
     pub(crate) fn tool(&mut self) -> &mut ToolLink {
         &mut self.tool
     }

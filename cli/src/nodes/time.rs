@@ -41,7 +41,6 @@ const BEGINS_WITHIN: Duration = Duration::from_secs(5);
 /// How often it is asked whether the new epoch has begun.
 const BEGINS_LOOK: Duration = Duration::from_millis(100);
 
-/// A node's report of its time.
 #[derive(Clone, Debug, Default, Serialize)]
 struct NodeTime {
     node: String,

@@ -68,7 +68,6 @@ impl Speech {
     }
 }
 
-/// A stream, and its queue.
 struct Stream {
     shared: Arc<Shared>,
     /// The prefix of each line in the journal; empty elsewhere.

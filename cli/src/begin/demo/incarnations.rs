@@ -19,7 +19,6 @@ pub(super) struct Death {
     pub(super) again: Option<(u32, u64)>,
 }
 
-/// A node with a watched router.
 struct WatchedNode {
     /// By its place in the configuration.
     index: usize,

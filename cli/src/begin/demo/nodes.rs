@@ -22,8 +22,8 @@ use rohrpost::interfaces::{
 };
 use rohrpost::wire::from_bytes;
 use rohrpost_config::Installation;
-use rohrpost_launch::survey::Survey;
-use rohrpost_mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
+use rohrpost_launch::survey::{Survey, sum};
+use rohrpost_mailbox::{MailboxInfo, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
 use serde::de::DeserializeOwned;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -110,7 +110,8 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     let died = seen.died();
     let (links, records) = settled(installation, &mut tool, &died)?;
     let losses = ExchangeLosses::ask(installation, &mut tool);
-    let kept = in_slots(installation, &mut tool)?;
+    let kept: Option<Vec<SlotState>> =
+        installation.tdma.as_ref().map(|_| of_routers(installation, &mut tool, RouterInterface::SLOTS)).transpose()?;
     let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
     let beyond = beyond::ask(installation, &mut tool)?;
     let mut vocabulary = Vocabulary::default();
@@ -150,9 +151,10 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     text += "\nOn the wire:\n\n";
     text += &account::by_link(&links);
     text += "\nIn the mailboxes of all nodes, and how long packages waited there:\n\n";
-    text += &print_classes(installation, &classes(&surveys));
+    let mailboxes: Vec<MailboxInfo> = surveys.into_iter().flat_map(|survey| survey.mailboxes).collect();
+    text += &print_classes(installation, &sum(&mailboxes));
     text += "(data and replies carry the class of the module that asked for them)\n";
-    if !kept.is_empty() {
+    if let Some(kept) = kept {
         text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
         text += &slots::kept(&kept);
     }
@@ -166,19 +168,6 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
         text += &losses;
     }
     Ok((text, well))
-}
-
-/// The mailboxes of all nodes.
-fn classes(surveys: &[Survey]) -> Vec<ClassTraffic> {
-    let mut classes: Vec<ClassTraffic> = Vec::new();
-    for traffic in surveys.iter().flat_map(|survey| &survey.classes) {
-        match classes.iter_mut().find(|known| known.class == traffic.class) {
-            Some(known) => known.add(traffic),
-            None => classes.push(traffic.clone()),
-        }
-    }
-    classes.sort_by_key(|traffic| std::cmp::Reverse(traffic.class));
-    classes
 }
 
 fn map(installation: &Installation, tool: &mut ToolLink) -> String {
@@ -257,14 +246,6 @@ fn settled(
         before = Some(records);
         std::thread::sleep(LOOK);
     }
-}
-
-/// How each node kept its time slots; empty where there are none.
-fn in_slots(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<SlotState>, Failure> {
-    if installation.tdma.is_none() {
-        return Ok(Vec::new());
-    }
-    of_routers(installation, tool, RouterInterface::SLOTS)
 }
 
 /// What the routers on both ends of replicas report; others report nothing of them.

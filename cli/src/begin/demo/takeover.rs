@@ -34,7 +34,6 @@ pub(super) struct Watch {
 pub(super) enum Victim {
     /// The router of the present master of time.
     Master,
-    /// The TCP router.
     TcpRouter,
 }
 
@@ -71,13 +70,11 @@ impl Watch {
         Ok(Self { kill, thread, installation: installation.clone() })
     }
 
-    /// Kills a router.
     pub(super) fn kill(&self, victim: Victim) {
         // It ends only when the channel closes.
         let _ = self.kill.send(victim);
     }
 
-    /// Ends the thread.
     pub(super) fn end(self) -> Result<TakeoverRecord, Failure> {
         drop(self.kill);
         let name = &self.installation.name;

@@ -81,7 +81,6 @@ pub(super) enum Body<'a> {
     Enum(Vec<Variant<'a>>),
 }
 
-/// A variant of an enum.
 pub(super) struct Variant<'a> {
     pub(super) name: &'a str,
     pub(super) text: &'a str,

@@ -43,7 +43,6 @@ pub(super) enum FileError {
     Deep(serde_json::Error),
 }
 
-/// What is wrong at a place.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum PlaceProblem {
     #[error("expected {expected}, got `{}`", plain::line(.got))]

@@ -186,7 +186,6 @@ impl<'a> PythonCode<'a> {
         format!("tuple[{}]", if all.is_empty() { "()".into() } else { all.join(", ") })
     }
 
-    /// A class with fields.
     fn class(
         &self,
         name: &str,

@@ -2,7 +2,6 @@
 
 use rohrpost::output::plain;
 
-/// Bytes of a name.
 pub(super) const NAME_BYTES_MAX: usize = 200;
 /// Types inside of each other: what compilers of all languages take without being told.
 pub(super) const DEPTH_MAX: usize = 64;

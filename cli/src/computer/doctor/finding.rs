@@ -30,7 +30,6 @@ pub(super) struct Finding {
     pub(super) state: Grade,
     /// What was found.
     pub(super) is: String,
-    /// Why it matters.
     pub(super) why: &'static str,
     /// The fix: a command, if there is one.
     pub(super) fix: Option<String>,
@@ -45,12 +44,10 @@ impl Check {
         Finding { what: self.0, state: Grade::Ok, is: is.into(), why: self.1, fix: None }
     }
 
-    /// With the fix.
     pub(super) fn warn(self, is: impl Into<String>, fix: impl Into<String>) -> Finding {
         Finding { state: Grade::Warn, fix: Some(fix.into()), ..self.ok(is) }
     }
 
-    /// With the fix.
     pub(super) fn bad(self, is: impl Into<String>, fix: impl Into<String>) -> Finding {
         Finding { state: Grade::Bad, ..self.warn(is, fix) }
     }

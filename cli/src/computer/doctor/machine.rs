@@ -19,7 +19,6 @@ pub(super) struct Needs {
     pub(super) gui: bool,
     /// The viewer's bridge, if the configuration has it.
     pub(super) bridge: Option<PathBuf>,
-    /// Number of processes.
     pub(super) processes: usize,
     /// The configuration's file.
     pub(super) from: Option<PathBuf>,
@@ -109,7 +108,6 @@ pub(super) struct StreamsFound {
     pub(super) bytes: u64,
 }
 
-/// What is in a node's directory.
 pub(super) enum NodeDirectory {
     /// A launch with this process id runs it.
     Launched(u32),
@@ -156,7 +154,6 @@ impl Machine {
         Some(text.trim().to_owned())
     }
 
-    /// The path of one of its folders.
     pub(super) fn folder(&self, path: &str) -> PathBuf {
         self.root.join(path.trim_start_matches('/'))
     }
@@ -200,7 +197,6 @@ pub(crate) fn room_of_nodes(base: &Path) -> Option<Room> {
     sys::room(there).ok()
 }
 
-/// A limit of the kernel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Limit {
     None,

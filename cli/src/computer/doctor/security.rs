@@ -16,7 +16,6 @@ pub(super) struct Protection {
     pub(super) tcp: Option<Tcp>,
 }
 
-/// The protection of LAN datagrams.
 #[derive(Clone, Debug)]
 pub(super) enum LanProtection {
     Open,

@@ -95,7 +95,6 @@ impl Edge {
         self.refused += other.refused;
     }
 
-    /// Its label in a drawing.
     pub(super) fn label(&self) -> String {
         format!("{} {}", plain::line(&self.what), self.rate())
     }

@@ -12,7 +12,6 @@ use rohrpost_mailbox::{Missed, RecordInfo, StreamId};
 use serde::Serialize;
 use std::time::Duration;
 
-/// A stream.
 #[derive(Serialize)]
 pub(crate) struct StreamView {
     node: String,
@@ -195,7 +194,6 @@ pub(crate) fn print_streams(streams: &[StreamView], several: bool) -> String {
     table_of(&heads[first..], rows)
 }
 
-/// All that is known of one stream.
 pub(super) fn print_stream(stream: &StreamView) -> String {
     let writer = match &stream.writer {
         None => "nobody yet".into(),

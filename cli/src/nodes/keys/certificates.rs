@@ -102,7 +102,6 @@ pub(crate) fn make(installation: &Installation, which: Renewal, days: u32) -> Re
     Ok(made.into_iter().map(|made| made.path).collect())
 }
 
-/// The signing authority.
 struct Signing {
     authority: Authority,
     /// None if its key is not here.
@@ -228,13 +227,11 @@ fn hold(params: &mut CertificateParams, days: u32) {
 /// Why certificates cannot be made or read.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CertificateError {
-    /// A file.
     #[error("{0}: {1}")]
     File(PathBuf, io::Error),
     /// Other users may read a key.
     #[error(transparent)]
     Open(#[from] KeysError),
-    /// The certificate of the authority.
     #[error(transparent)]
     Authority(#[from] SealError),
     /// Only half of the authority is there.
@@ -245,7 +242,6 @@ pub(crate) enum CertificateError {
         certificate = .0.display(), secret = .1.display(), file = .2.display()
     )]
     NoKey(PathBuf, PathBuf, PathBuf),
-    /// Key and certificate belong to different authorities.
     #[error(
         "{secret} is not the key of {certificate}: they are of two authorities. Bring both from where one of them was \
          made, or `rohrpost keys rotate --authority {file}` begins anew",

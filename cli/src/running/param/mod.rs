@@ -193,7 +193,6 @@ fn find<'p>(parameters: &'p [Parameter], module: &str, name: &str) -> Result<&'p
     parameters.iter().find(|parameter| parameter.field.name == name).ok_or_else(unknown)
 }
 
-/// The message for a module without parameters.
 fn no_parameters(module: &str) -> String {
     format!("{module} has no parameters: its settings are read when it starts")
 }

@@ -31,7 +31,6 @@ pub(super) struct App {
     pub(super) message: Option<String>,
 }
 
-/// The content of the screen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Screen {
     Table,
@@ -104,7 +103,6 @@ impl App {
         rows.iter().position(|row| Some(row.name) == self.selected).unwrap_or(0)
     }
 
-    /// Handles a key.
     pub(super) fn key(&mut self, key: KeyEvent, model: &Model) -> Option<ScreenAction> {
         if key.modifiers.contains(KeyModifiers::CONTROL) {
             return (key.code == KeyCode::Char('c')).then_some(ScreenAction::Quit);

@@ -1,7 +1,7 @@
 //! The calls of `top`: to switch modules on and off, for output lines, for the causes of errors. Nothing here blocks:
 //! calls are begun, and polled in each round, so that a module that hangs freezes no screen.
 
-use crate::look::observer::{Silence, silence};
+use crate::look::observer::{PATIENCE, Silence, silence};
 use crate::look::target::Running;
 use rohrpost::CallError;
 use rohrpost::common::{self, Status};
@@ -10,10 +10,6 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Name, ToolLink};
 use rohrpost_launch::launcher::{AskLaunch, ControlError, SnapshotRequest, launcher_of};
 use rohrpost_launch::survey::{Distant, Scope, Snapshot, Survey};
-use std::time::Duration;
-
-/// Timeout for an answer.
-pub(super) const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A call that is under way.
 struct Call {
@@ -22,7 +18,6 @@ struct Call {
     purpose: Purpose,
 }
 
-/// The purpose of its answer.
 enum Purpose {
     Switch(bool),
     Lines,
@@ -75,7 +70,6 @@ impl Calls {
         self.begun(running, collector, Purpose::Lines, begun)
     }
 
-    /// Asks launch to restart a module.
     pub(super) fn restart(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let launcher = running.launcher_of(module).unwrap_or(self.tool.launcher());
         let begun = self.tool.begin_restart(launcher, &running.text(module));

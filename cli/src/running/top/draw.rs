@@ -189,7 +189,6 @@ fn put(to: &mut Buffer, place: Rect, text: &str, style: Style) {
     }
 }
 
-/// The columns of a table of this width.
 pub(super) fn columns(model: &Model, width: u16) -> Vec<(Column, u16)> {
     let longest = model.modules.iter().map(|row| full_name(row).chars().count()).max().unwrap_or(0);
     fit(width.saturating_sub(MARK), longest as u16, model.nodes.len() > 1)
@@ -219,7 +218,6 @@ fn pad(text: &str, width: u16, right: bool) -> String {
     if right { format!("{text:>width$}") } else { format!("{text:<width$}") }
 }
 
-/// A line of the table.
 fn line(to: &mut Buffer, place: Rect, mark: &str, cells: impl Iterator<Item = (String, Style)>) {
     put(to, place, mark, Style::new());
     let mut x = place.x + MARK;

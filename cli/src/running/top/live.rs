@@ -67,7 +67,6 @@ struct Live {
     model: Model,
     /// The last reports of other nodes, in the order of the configuration.
     others: NodeSurveys,
-    /// Since when silent nodes are silent.
     silent_since: HashMap<String, Instant>,
     /// Interfaces of other nodes' modules; each module is asked once.
     described: HashMap<Name, Option<Description>>,

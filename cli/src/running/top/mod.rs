@@ -21,6 +21,7 @@ mod terminal;
 mod tests;
 mod text;
 
+use crate::look::observer::PATIENCE;
 use crate::look::target::{Running, Target};
 use crate::terminal::{Failure, say};
 use model::{ErrorCauses, Model};
@@ -82,7 +83,7 @@ fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
     let mut now = model::put_together(running, seen.clone(), Some(&earlier), &ErrorCauses::default());
     let unexplained: Vec<Name> = now.unexplained().collect();
     if !unexplained.is_empty()
-        && let Ok(mut tool) = running.join(calls::PATIENCE)
+        && let Ok(mut tool) = running.join(PATIENCE)
     {
         let status = |name| Some((name, tool.status(name).ok()?.error));
         let said = unexplained.into_iter().filter_map(status).collect();

@@ -180,7 +180,6 @@ impl Model {
         }
     }
 
-    /// The module of this name.
     pub(super) fn row(&self, name: Name) -> Option<&Row> {
         self.modules.iter().find(|row| row.name == name)
     }

@@ -34,7 +34,6 @@ pub(super) struct LanView {
 /// A port that a router needs.
 #[derive(Clone, Debug)]
 pub(super) struct Port {
-    /// What it is for.
     pub(super) what: &'static str,
     pub(super) number: u16,
     pub(super) state: PortState,
@@ -61,7 +60,6 @@ pub(super) enum Stamps {
     Unknown,
 }
 
-/// Another node.
 #[derive(Clone, Debug)]
 pub(super) struct PeerNode {
     pub(super) name: String,
