@@ -199,9 +199,7 @@ fn parameters() -> Vec<CompletionCandidate> {
     let found = target().find().ok().and_then(|running| {
         let name = named(&running)?;
         let mut tool = running.join(PATIENCE).ok()?;
-        let answer = tool.parameters(name).ok();
-        tool.close();
-        answer
+        tool.parameters(name).ok()
     });
     found.unwrap_or_default().iter().map(|parameter| candidate(&parameter.field.name, &parameter.field.text)).collect()
 }

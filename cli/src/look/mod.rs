@@ -201,7 +201,12 @@ impl Running {
 
     /// Runs a query from the tool's place on its own node.
     fn ask<T>(&self, ask: impl FnOnce(&mut ToolLink) -> T) -> Result<T, Failure> {
-        self.observer.with(|| self.join(PATIENCE), ask)
+        let mut place = self.observer.borrow_mut();
+        let tool = match place.take() {
+            Some(tool) => tool,
+            None => self.join(PATIENCE)?,
+        };
+        Ok(ask(place.insert(tool)))
     }
 }
 

@@ -1,13 +1,14 @@
 //! `rohrpost send`: repeats a command, like a person at a keyboard. Unlike `call` it waits for no answer
 //! before it sends the next; answers are counted.
 
+use crate::look::observer::Tool;
 use crate::look::target::{Running, Target};
 use crate::running::call::{COMMON, body_of, names};
 use crate::terminal::units::{LOOK, Stop, rate, seconds};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::output::plain;
 use rohrpost::schema::{Description, Function, Value, decode};
-use rohrpost::{CallError, Name, ToolLink};
+use rohrpost::{CallError, Name};
 use rohrpost_mailbox::wait_any;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -108,7 +109,7 @@ struct Sending<'a> {
     interface: u32,
     body: Vec<u8>,
     timeout: Duration,
-    tool: ToolLink,
+    tool: Tool,
     /// Calls without an answer so far.
     under_way: Vec<u32>,
     counts: Counts,
@@ -201,7 +202,6 @@ impl Sending<'_> {
     }
 
     fn finish(self, json: bool) -> Result<ExitCode, Failure> {
-        self.tool.close();
         let counts = self.counts;
         if json {
             say(serde_json::to_string(&counts)?);

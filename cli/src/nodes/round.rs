@@ -1,14 +1,14 @@
 //! Polls the routers of all nodes one after the other, once or repeatedly: shared by `net` and `time`.
 
 use crate::look::newest;
-use crate::look::observer::PATIENCE;
+use crate::look::observer::{PATIENCE, Tool};
 use crate::look::target::{Running, Target};
 use crate::terminal::Failure;
 use crate::terminal::units::{Stop, seconds};
 use rohrpost::Name;
 use rohrpost::interface::DataPort;
 use rohrpost::serde::de::DeserializeOwned;
-use rohrpost::{CallError, Fault, ToolLink};
+use rohrpost::{CallError, Fault};
 use rohrpost_config::Installation;
 use std::time::Duration;
 
@@ -33,7 +33,7 @@ pub(crate) struct Round {
     pub(crate) running: Running,
     pub(crate) interval: Duration,
     pub(crate) stop: Stop,
-    tool: ToolLink,
+    pub(crate) tool: Tool,
 }
 
 impl Rounds {
@@ -71,14 +71,5 @@ impl Round {
             CallError::Fault(_, Fault::NothingYet) => "it has just started; ask again".into(),
             error => self.running.told(module, &error).to_string(),
         })
-    }
-
-    pub(crate) fn tool(&mut self) -> &mut ToolLink {
-        &mut self.tool
-    }
-
-    /// Ends the polling.
-    pub(crate) fn close(self) {
-        self.tool.close();
     }
 }

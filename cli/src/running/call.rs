@@ -52,7 +52,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let module = running.module(&arguments.name)?;
     let mut tool = running.join(seconds(arguments.timeout)?)?;
     let result = answer(arguments, &running, module, &mut tool);
-    tool.close();
     let (text, failed) = result.map_err(|error| running.told(module, &*error))?;
     if arguments.json {
         say(text)

@@ -1,9 +1,10 @@
 //! `rohrpost restart`, `stop` and `start`: one module of a running node, through its launch.
 
+use crate::look::observer::Tool;
 use crate::look::target::{Running, Target};
 use crate::terminal::{Failure, say};
+use rohrpost::CallError;
 use rohrpost::output::plain;
-use rohrpost::{CallError, ToolLink};
 use rohrpost_launch::launcher::{AskLaunch, ChildState, ControlError, Phase};
 use rohrpost_launch::survey::Scope;
 use rohrpost_mailbox::{ModuleState, Name, ParticipantInfo};
@@ -68,9 +69,7 @@ pub(crate) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
     let tool = running.join(PATIENCE)?;
     let began = Instant::now();
     let mut asked = ModuleOrder { running: &running, name: module.name, text, launcher, tool, began, timeout };
-    let result = asked.carry_out(order, !arguments.no_wait);
-    asked.tool.close();
-    say(result?);
+    say(asked.carry_out(order, !arguments.no_wait)?);
     Ok(ExitCode::SUCCESS)
 }
 
@@ -80,7 +79,7 @@ struct ModuleOrder<'a> {
     text: String,
     /// Launch of the module's node.
     launcher: Name,
-    tool: ToolLink,
+    tool: Tool,
     began: Instant,
     timeout: Duration,
 }

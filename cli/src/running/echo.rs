@@ -46,7 +46,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let module = running.module(&arguments.name)?;
     let mut tool = running.join(PATIENCE)?;
     let result = echo(arguments, &running, module, &mut tool);
-    tool.close();
     result.map(|()| ExitCode::SUCCESS).map_err(|error| running.told(module, &*error))
 }
 

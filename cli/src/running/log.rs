@@ -40,21 +40,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let mut tool = running.join(crate::terminal::units::seconds(arguments.timeout)?)?;
     if arguments.levels {
-        let code = levels::list(&running, arguments.json, &mut tool);
-        tool.close();
-        return code;
+        return levels::list(&running, arguments.json, &mut tool);
     }
     let code = levels::set(&settings, &running, arguments, &mut tool);
     if !settings.is_empty() && !arguments.follow {
-        tool.close();
         return Ok(code);
     }
     filter.since_ns = since.map(|since| tool.clock.now().ns.saturating_sub(since.as_nanos() as u64));
     let show = Show { filter, format: Format::new(&running.installation), arguments };
     let mut reader = Reader::new(&running, collector);
-    let result = show.all(&mut reader, &mut tool);
-    tool.close();
-    result.map(|()| code)
+    show.all(&mut reader, &mut tool).map(|()| code)
 }
 
 impl Show<'_> {

@@ -134,40 +134,39 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
         text += &format!("\n{deaths}\n");
     }
     text += &map;
-    for error in &errors {
-        text += &format!("{error}\n");
-    }
-    text += "\nOver the network; age: from the stamp of data to the mailbox on the other node:\n\n";
-    text += &slots::by_class(installation, &links, |_| true);
-    let replicas = records.table();
-    if !replicas.is_empty() {
-        text += "\nStreams by replicas; delay: from writing to the arrival of the whole record:\n\n";
-        text += &replicas;
-    }
+    text.extend(errors.iter().map(|error| format!("{error}\n")));
+    let carried = slots::by_class(installation, &links, |_| true);
+    text += &part("Over the network; age: from the stamp of data to the mailbox on the other node", &carried);
+    text += &part("Streams by replicas; delay: from writing to the arrival of the whole record", &records.table());
     text += &beyond::text(installation, &beyond, seen.tcp_router_died());
     if !verbose {
         return Ok((text, well));
     }
-    text += "\nOn the wire:\n\n";
-    text += &account::by_link(&links);
-    text += "\nIn the mailboxes of all nodes, and how long packages waited there:\n\n";
+    text += &part("On the wire", &account::by_link(&links));
     let mailboxes: Vec<MailboxInfo> = surveys.into_iter().flat_map(|survey| survey.mailboxes).collect();
-    text += &print_classes(installation, &sum(&mailboxes));
+    let classes = print_classes(installation, &sum(&mailboxes));
+    text += &part("In the mailboxes of all nodes, and how long packages waited there", &classes);
     text += "(data and replies carry the class of the module that asked for them)\n";
-    if let Some(kept) = kept {
-        text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
-        text += &slots::kept(&kept);
-    }
+    text += &part(
+        "In time slots; off: how far the last frames were from the beginnings of their slots",
+        &slots::kept(&kept.unwrap_or_default()),
+    );
+    text += &part("Declared flows; a slot that was late or skipped costs a cycle", &late);
     if !late.is_empty() {
-        text +=
-            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle:\n\n{late}{}", flows::legend());
+        text += &flows::legend();
     }
     if !installation.flows.is_empty() {
-        text +=
-            "\nDeclared flows from end to end, as modules count them; too late: answered after the caller's time:\n\n";
-        text += &losses;
+        text += &part(
+            "Declared flows from end to end, as modules count them; too late: answered after the caller's time",
+            &losses,
+        );
     }
     Ok((text, well))
+}
+
+/// A part of the summary below its head; empty without content.
+fn part(head: &str, content: &str) -> String {
+    if content.is_empty() { String::new() } else { format!("\n{head}:\n\n{content}") }
 }
 
 fn map(installation: &Installation, tool: &mut ToolLink) -> String {

@@ -5,7 +5,7 @@ use super::blueprint::{Blueprint, Body, Inside, Layout, NamedType, Operation, Pu
 use super::names::{Scope, camel, is_plain, last, snake, standard_name};
 use super::refusal::{Refusal, cannot};
 use super::texts::{in_docstring, literal, one_line, python_literal, wrapped};
-use rohrpost::schema::{DataKind, Field};
+use rohrpost::schema::{DataKind, Field, Type};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
@@ -105,15 +105,7 @@ impl<'a> PythonCode<'a> {
     fn ty(&self, layout: &Layout) -> String {
         let inner = |layout: &Layout| self.ty(layout);
         match layout {
-            Layout::Unit => "None".into(),
-            Layout::Bool => "bool".into(),
-            Layout::Whole(true, 64) => "int".into(),
-            Layout::Whole(signed, bits) => format!("rp.{}{bits}", if *signed { 'I' } else { 'U' }),
-            Layout::F32 => "rp.F32".into(),
-            Layout::F64 => "float".into(),
-            Layout::Char => "rp.Char".into(),
-            Layout::Text => "str".into(),
-            Layout::Bytes => "bytes".into(),
+            Layout::Plain(plain) => plain.python.into(),
             Layout::Option(some) if self.is_nullable(some) => format!("Annotated[{}, rp.maybe]", inner(some)),
             Layout::Option(some) => format!("{} | None", inner(some)),
             Layout::List(element) => format!("list[{}]", inner(element)),
@@ -132,7 +124,8 @@ impl<'a> PythonCode<'a> {
     /// Whether `None` is among its values.
     fn is_nullable(&self, layout: &Layout) -> bool {
         match layout {
-            Layout::Unit | Layout::Option(_) => true,
+            Layout::Plain(plain) => plain.ty == Type::Unit,
+            Layout::Option(_) => true,
             Layout::Named(place) => match &self.blueprint.types[*place].body {
                 Body::Struct(Inside::Nothing) => true,
                 Body::Struct(Inside::One(part)) => self.is_nullable(&part.layout),
@@ -245,7 +238,7 @@ impl<'a> PythonCode<'a> {
             let carried = match &variant.inside {
                 Inside::Nothing => "None".into(),
                 // `None` alone would be a variant that carries nothing.
-                Inside::One(part) if part.layout == Layout::Unit && said(part.field, "").is_empty() => {
+                Inside::One(part) if part.layout.is(&Type::Unit) && said(part.field, "").is_empty() => {
                     "Annotated[None, rp.said()]".into()
                 }
                 Inside::One(part) => self.annotation(part, ""),

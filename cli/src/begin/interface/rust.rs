@@ -115,26 +115,18 @@ impl<'a> RustCode<'a> {
 
     fn is_ordered(&self, layout: &Layout) -> bool {
         match layout {
-            Layout::F32 | Layout::F64 => false,
+            Layout::Plain(plain) => !matches!(plain.ty, Type::F32 | Type::F64),
             Layout::Option(inner) | Layout::List(inner) | Layout::Array(_, inner) => self.is_ordered(inner),
             Layout::Map(a, b) | Layout::Result(a, b) => self.is_ordered(a) && self.is_ordered(b),
             Layout::Tuple(all) => all.iter().all(|one| self.is_ordered(one)),
             Layout::Named(place) => self.ordered[*place],
-            _ => true,
         }
     }
 
     fn ty(&self, layout: &Layout, place: &str) -> Result<String, Refusal> {
         let inner = |layout: &Layout| self.ty(layout, place);
         Ok(match layout {
-            Layout::Unit => "()".into(),
-            Layout::Bool => "bool".into(),
-            Layout::Whole(signed, bits) => format!("{}{bits}", if *signed { 'i' } else { 'u' }),
-            Layout::F32 => "f32".into(),
-            Layout::F64 => "f64".into(),
-            Layout::Char => "char".into(),
-            Layout::Text => "String".into(),
-            Layout::Bytes => "rohrpost::types::Bytes".into(),
+            Layout::Plain(plain) => plain.rust.into(),
             Layout::Option(some) => format!("Option<{}>", inner(some)?),
             Layout::List(element) => format!("Vec<{}>", inner(element)?),
             Layout::Array(length, _) if *length > 32 => {
@@ -277,7 +269,7 @@ impl<'a> RustCode<'a> {
             long += &format!("        {}{argument},\n", said.map_or(String::new(), |said| format!("{said} ")));
         }
         let result = match &operation.result {
-            Layout::Unit => String::new(),
+            layout if layout.is(&Type::Unit) => String::new(),
             result => format!(" -> {}", self.ty(result, name)?),
         };
         let fn_name = exact(name, name)?;

@@ -77,7 +77,6 @@ pub(crate) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
         wait = round.interval;
         stopped = round.stop.within(wait);
     }
-    round.close();
     Ok(if well || (stopped && rounds.watch) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 

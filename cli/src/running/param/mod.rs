@@ -4,11 +4,12 @@ mod save;
 mod set;
 mod show;
 
+use crate::look::observer::Tool;
 use crate::look::target::{Running, Target};
 use crate::terminal::{Failure, complain};
 use rohrpost::output::plain;
 use rohrpost::parameter::{Parameter, Refusal};
-use rohrpost::{CallError, Fault, Name, ToolLink};
+use rohrpost::{CallError, Fault, Name};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -130,16 +131,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn at_work(common: &Common, work: impl FnOnce(&mut Session) -> Result<ExitCode, Failure>) -> Result<ExitCode, Failure> {
     let running = common.target.find()?;
     let tool = running.join(crate::terminal::units::seconds(common.timeout)?)?;
-    let mut session = Session { running, tool };
-    let result = work(&mut session);
-    session.tool.close();
-    result
+    work(&mut Session { running, tool })
 }
 
 /// A running node, and a place on it.
 struct Session {
     running: Running,
-    tool: ToolLink,
+    tool: Tool,
 }
 
 impl Session {

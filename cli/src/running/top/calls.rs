@@ -1,13 +1,13 @@
 //! The calls of `top`: to switch modules on and off, for output lines, for the causes of errors. Nothing here blocks:
 //! calls are begun, and polled in each round, so that a module that hangs freezes no screen.
 
-use crate::look::observer::{PATIENCE, Silence, silence};
+use crate::look::observer::{PATIENCE, Silence, Tool, silence};
 use crate::look::target::Running;
 use rohrpost::CallError;
+use rohrpost::Name;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::wire::{append, from_bytes};
-use rohrpost::{Name, ToolLink};
 use rohrpost_launch::launcher::{AskLaunch, ControlError, SnapshotRequest, launcher_of};
 use rohrpost_launch::survey::{Distant, Scope, Snapshot, Survey};
 
@@ -37,7 +37,7 @@ pub(super) enum Answer {
 
 /// The place of `top` among the callers.
 pub(super) struct Calls {
-    tool: ToolLink,
+    tool: Tool,
     under_way: Vec<Call>,
     /// Observes other nodes.
     looks: Vec<(String, Distant)>,
@@ -47,11 +47,6 @@ impl Calls {
     /// Takes part as a tool.
     pub(super) fn join(running: &Running) -> Result<Self, crate::terminal::Failure> {
         Ok(Self { tool: running.join(PATIENCE)?, under_way: Vec::new(), looks: Vec::new() })
-    }
-
-    /// Releases the place.
-    pub(super) fn close(self) {
-        self.tool.close();
     }
 
     pub(super) fn switch(&mut self, running: &Running, module: Name, on: bool) -> Option<Answer> {

@@ -34,9 +34,6 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
         let typed = keyboard()?;
         live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(LaunchEvent::Stop)))
     };
-    if let Some(calls) = live.calls {
-        calls.close();
-    }
     outcome.map(|()| ExitCode::SUCCESS)
 }
 
@@ -192,9 +189,7 @@ impl Live {
         self.others = others;
         self.silent_since.clear();
         self.described.clear();
-        if let Some(calls) = self.calls.take() {
-            calls.close();
-        }
+        self.calls = None;
         (self.running, self.now, self.earlier) = (running, now, None);
         self.said = ErrorCauses::default();
         self.output = Output::new(&self.running.installation);

@@ -87,7 +87,6 @@ fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
     {
         let status = |name| Some((name, tool.status(name).ok()?.error));
         let said = unexplained.into_iter().filter_map(status).collect();
-        tool.close();
         now = model::put_together(running, seen, Some(&earlier), &said);
     }
     let mut model = Model::new(&running.installation, &running.node_name, &running.shown(), &now, Some(&earlier));

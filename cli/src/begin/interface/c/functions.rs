@@ -1,6 +1,8 @@
 //! Types of C as others use them, and functions that write and read them as postcard.
 
+use super::super::blueprint::Plain;
 use super::super::texts::c_comment;
+use rohrpost::schema::Type;
 use std::fmt::Write;
 
 /// A type of C.
@@ -38,8 +40,9 @@ impl CType {
     }
 
     /// One that `postcard.h` reads and writes.
-    pub(super) fn plain(name: &str, word: &'static str, size: u64) -> Self {
-        Self { name: name.into(), word: Some(word), size, takes_bytes: word != "nothing" }
+    pub(super) fn plain(plain: &Plain) -> Self {
+        let word = if plain.ty == Type::Unit { "nothing" } else { plain.word };
+        Self { name: plain.c.into(), word: Some(word), size: plain.c_bytes, takes_bytes: plain.ty != Type::Unit }
     }
 
     /// As other names have it in them.

@@ -70,23 +70,7 @@ impl<'a> CTypes<'a> {
 
     fn make(&mut self, layout: &Layout, place: &str) -> Result<CType, Refusal> {
         Ok(match layout {
-            Layout::Unit => CType::plain("rp_nothing", "nothing", 1),
-            Layout::Bool => CType::plain("bool", "bool", 1),
-            Layout::Whole(false, 8) => CType::plain("uint8_t", "u8", 1),
-            Layout::Whole(false, 16) => CType::plain("uint16_t", "u16", 2),
-            Layout::Whole(false, 32) => CType::plain("uint32_t", "u32", 4),
-            Layout::Whole(false, 64) => CType::plain("uint64_t", "u64", 8),
-            Layout::Whole(false, _) => CType::plain("rp_u128", "u128", 16),
-            Layout::Whole(true, 8) => CType::plain("int8_t", "i8", 1),
-            Layout::Whole(true, 16) => CType::plain("int16_t", "i16", 2),
-            Layout::Whole(true, 32) => CType::plain("int32_t", "i32", 4),
-            Layout::Whole(true, 64) => CType::plain("int64_t", "i64", 8),
-            Layout::Whole(true, _) => CType::plain("rp_i128", "i128", 16),
-            Layout::F32 => CType::plain("float", "f32", 4),
-            Layout::F64 => CType::plain("double", "f64", 8),
-            Layout::Char => CType::plain("uint32_t", "char", 4),
-            Layout::Text => CType::plain("rp_text", "text", 16),
-            Layout::Bytes => CType::plain("rp_bytes", "bytes", 16),
+            Layout::Plain(plain) => CType::plain(plain),
             Layout::Option(some) => {
                 let some = self.of(some, place)?;
                 let name = self.around("option", &some);
