@@ -52,7 +52,6 @@ type Count = (String, u64);
 /// The recorded file.
 #[derive(Debug, PartialEq, Eq)]
 struct Ceilings {
-    /// The compiler's version and target.
     compiler: String,
     paths: Vec<Count>,
 }

@@ -17,7 +17,6 @@ pub(crate) fn path() -> PathBuf {
     cargo::target().join("test-report.txt")
 }
 
-/// Begins an empty report.
 pub(crate) fn begin() -> Result<(), Failure> {
     fs::create_dir_all(cargo::target())
         .and_then(|()| fs::write(path(), ""))

@@ -215,13 +215,11 @@ fn call_arguments() -> Vec<CompletionCandidate> {
     }
 }
 
-/// The description of the module that the words name.
 fn described() -> Option<Description> {
     let running = target().find().ok()?;
     running.describe(named(&running)?).ok()
 }
 
-/// The module that the words name.
 fn named(running: &Running) -> Option<Name> {
     let classes = &running.installation.classes;
     words().iter().find_map(|word| classes.parse_module(word).ok())

@@ -17,7 +17,6 @@ pub(super) struct LogLines {
     collector: Name,
     /// The collector's incarnation that `next` belongs to.
     incarnation: Option<u32>,
-    /// Number of the next line.
     next: u64,
     /// The question that is under way.
     call: Option<u32>,

@@ -13,7 +13,6 @@ use std::time::{Duration, Instant};
 
 /// Launch answers within this time: it waits for nobody.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How often the progress is polled.
 const POLL: Duration = Duration::from_millis(20);
 /// Added to the module's own limits: time for a killed process to end, and for launch to notice.
 const MARGIN: Duration = Duration::from_secs(7);

@@ -17,7 +17,6 @@ use std::collections::VecDeque;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Polling period for new lines.
 pub(crate) const POLL: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -52,16 +51,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     show.all(&mut reader, &mut tool).map(|()| code)
 }
 
+/// Adds a line to the last ones, of which so many are kept.
+fn keep_last(last: &mut VecDeque<OutputLine>, line: OutputLine, count: usize) {
+    last.push_back(line);
+    if last.len() > count {
+        last.pop_front();
+    }
+}
+
 impl Show<'_> {
     fn all(&self, reader: &mut Reader<'_>, tool: &mut rohrpost::ToolLink) -> Result<(), Failure> {
         let stop = rohrpost_launch::events()?;
         // With --last, earlier lines are shown after all of them have been read.
         let mut last = VecDeque::new();
         let keep = |line: OutputLine| {
-            last.push_back(line);
-            if last.len() > self.arguments.last.unwrap_or(0) {
-                last.pop_front();
-            }
+            keep_last(&mut last, line, self.arguments.last.unwrap_or(0));
             true
         };
         if self.arguments.last.is_some() {

@@ -34,7 +34,6 @@ struct StatusRow {
     node: String,
     #[serde(flatten)]
     account: Account,
-    /// The module's own report.
     #[serde(flatten)]
     figures: Option<ModuleFigures>,
     /// Why there is no report.

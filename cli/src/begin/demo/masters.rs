@@ -57,7 +57,6 @@ pub(super) struct MasterTerm {
     /// When its first frame crossed the bridge, monotonic ns.
     pub(super) first_ns: u64,
     pub(super) first_cycle: u64,
-    /// When its last frame did.
     pub(super) last_ns: u64,
     pub(super) last_cycle: u64,
 }

@@ -257,7 +257,6 @@ fn replicas(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Repl
     ends.map(|node| of_router(installation, tool, &node.name, RouterInterface::REPLICAS)).collect()
 }
 
-/// The reports of all nodes' routers.
 fn of_routers<T: DeserializeOwned>(
     installation: &Installation,
     tool: &mut ToolLink,

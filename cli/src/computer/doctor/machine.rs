@@ -15,7 +15,6 @@ pub(super) struct Needs {
     pub(super) priority: u8,
     /// Bytes of mailboxes and of the streams that the configuration names.
     pub(super) memory: u64,
-    /// Whether a GUI runs.
     pub(super) gui: bool,
     /// The viewer's bridge, if the configuration has it.
     pub(super) bridge: Option<PathBuf>,
@@ -91,7 +90,6 @@ pub(super) struct Bridge {
     pub(super) pid: Option<u32>,
 }
 
-/// A node's directory.
 pub(super) struct NodeFound {
     pub(super) path: PathBuf,
     pub(super) seen: NodeDirectory,
@@ -100,7 +98,6 @@ pub(super) struct NodeFound {
     pub(super) clock_set_by_ns: Option<i64>,
 }
 
-/// The streams in a node's directory.
 #[derive(Default)]
 pub(super) struct StreamsFound {
     pub(super) number: usize,

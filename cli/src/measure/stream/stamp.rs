@@ -25,6 +25,7 @@ pub(crate) fn parse_stamp(text: &str) -> Result<u64, String> {
 }
 
 /// How far a time is from another one, ns.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Offset {
     /// Before it: `-1.5s`.
     Before(u64),
@@ -50,10 +51,8 @@ pub(crate) fn parse_offset(text: &str) -> Result<Option<Offset>, String> {
 pub(super) enum StreamMoment {
     /// ns since 1970.
     At(u64),
-    /// So many ns before the newest record.
-    BeforeNewest(u64),
-    /// So many ns after the newest record.
-    AfterNewest(u64),
+    /// So far from the newest record.
+    FromNewest(Offset),
 }
 
 impl StreamMoment {
@@ -61,8 +60,8 @@ impl StreamMoment {
     pub(super) fn stamp(self, newest: Stamp, epoch: Option<u64>) -> Stamp {
         let ns = match self {
             Self::At(ns) => ns,
-            Self::BeforeNewest(by_ns) => newest.ns.saturating_sub(by_ns),
-            Self::AfterNewest(by_ns) => newest.ns.saturating_add(by_ns),
+            Self::FromNewest(Offset::Before(by_ns)) => newest.ns.saturating_sub(by_ns),
+            Self::FromNewest(Offset::After(by_ns)) => newest.ns.saturating_add(by_ns),
         };
         Stamp { epoch: epoch.unwrap_or(newest.epoch), ns }
     }
@@ -71,10 +70,8 @@ impl StreamMoment {
 /// Reads a stamp in seconds, a whole number of nanoseconds, or a duration with its sign. A whole number that is too
 /// large for seconds is one of nanoseconds: those of each time later than 18.4 s after the beginning of 1970 are.
 pub(super) fn parse_moment(text: &str) -> Result<StreamMoment, String> {
-    match parse_offset(text)? {
-        Some(Offset::Before(ns)) => return Ok(StreamMoment::BeforeNewest(ns)),
-        Some(Offset::After(ns)) => return Ok(StreamMoment::AfterNewest(ns)),
-        None => {}
+    if let Some(offset) = parse_offset(text)? {
+        return Ok(StreamMoment::FromNewest(offset));
     }
     let whole = || text.parse().ok().filter(|_| text.bytes().all(|digit| digit.is_ascii_digit()));
     parse_stamp(text).ok().or_else(whole).map(StreamMoment::At).ok_or_else(|| {
@@ -113,10 +110,10 @@ mod tests {
             ("2", StreamMoment::At(2_000_000_000)),
             ("18446744073", StreamMoment::At(18_446_744_073_000_000_000)),
             ("18446744074", StreamMoment::At(18_446_744_074)),
-            ("-1.5s", StreamMoment::BeforeNewest(1_500_000_000)),
-            ("-20 ms", StreamMoment::BeforeNewest(20_000_000)),
-            ("+1 ns", StreamMoment::AfterNewest(1)),
-            ("-0s", StreamMoment::BeforeNewest(0)),
+            ("-1.5s", StreamMoment::FromNewest(Offset::Before(1_500_000_000))),
+            ("-20 ms", StreamMoment::FromNewest(Offset::Before(20_000_000))),
+            ("+1 ns", StreamMoment::FromNewest(Offset::After(1))),
+            ("-0s", StreamMoment::FromNewest(Offset::Before(0))),
         ] {
             assert_eq!(parse_moment(text), Ok(moment), "{text}");
         }
@@ -136,9 +133,9 @@ mod tests {
     #[test]
     fn a_time_is_counted_from_the_newest_record_and_of_its_epoch() {
         let newest = Stamp { epoch: 4, ns: 100 };
-        assert_eq!(StreamMoment::BeforeNewest(30).stamp(newest, None), Stamp { epoch: 4, ns: 70 });
-        assert_eq!(StreamMoment::BeforeNewest(300).stamp(newest, None), Stamp { epoch: 4, ns: 0 });
-        assert_eq!(StreamMoment::AfterNewest(30).stamp(newest, Some(3)), Stamp { epoch: 3, ns: 130 });
+        assert_eq!(StreamMoment::FromNewest(Offset::Before(30)).stamp(newest, None), Stamp { epoch: 4, ns: 70 });
+        assert_eq!(StreamMoment::FromNewest(Offset::Before(300)).stamp(newest, None), Stamp { epoch: 4, ns: 0 });
+        assert_eq!(StreamMoment::FromNewest(Offset::After(30)).stamp(newest, Some(3)), Stamp { epoch: 3, ns: 130 });
         assert_eq!(StreamMoment::At(7).stamp(newest, None), Stamp { epoch: 4, ns: 7 });
     }
 }

@@ -18,7 +18,6 @@ pub(super) struct Setting {
 }
 
 impl Setting {
-    /// Parses a module or a class, and a level.
     pub(super) fn read(name: &str, level: &str, running: &Running) -> Result<Self, Failure> {
         let level = call::level_of(level)?;
         if name.contains('.') {
@@ -96,7 +95,6 @@ struct LevelRow {
     failure: Option<String>,
 }
 
-/// Lists the levels of all modules.
 pub(super) fn list(running: &Running, json: bool, tool: &mut ToolLink) -> Result<ExitCode, Failure> {
     let mut lines = Vec::new();
     for (module, silence) in running.modules_to_ask()? {

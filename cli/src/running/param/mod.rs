@@ -141,7 +141,6 @@ struct Session {
 }
 
 impl Session {
-    /// A module's parameters, or the error in words.
     fn parameters(&mut self, module: Name) -> Result<Vec<Parameter>, Failure> {
         match self.tool.parameters(module) {
             Err(CallError::Fault(_, Fault::Unknown(_))) => {

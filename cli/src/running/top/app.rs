@@ -17,7 +17,6 @@ pub(super) struct App {
     pub(super) prompt: Prompt,
     /// None: in the order of the configuration.
     pub(super) sort: Option<Column>,
-    /// Columns that fit on the screen.
     pub(super) columns: Vec<Column>,
     pub(super) reversed: bool,
     /// Only modules with this text in their name.
@@ -48,7 +47,6 @@ pub(super) enum Prompt {
     Restart(Name),
 }
 
-/// The filter of output lines.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct LineFilter {
     pub(super) level: OutputLevel,

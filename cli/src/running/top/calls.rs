@@ -11,7 +11,6 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost_launch::launcher::{AskLaunch, ControlError, SnapshotRequest, launcher_of};
 use rohrpost_launch::survey::{Distant, Scope, Snapshot, Survey};
 
-/// A call that is under way.
 struct Call {
     sequence: u32,
     to: Name,

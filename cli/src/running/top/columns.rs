@@ -136,7 +136,6 @@ impl Column {
     }
 }
 
-/// A whole number, all its digits.
 fn whole(number: f64) -> String {
     format!("{number:.0}")
 }

@@ -29,7 +29,6 @@ const OUTPUT_MIN: u16 = 4;
 /// A lower terminal shows no output below details and help.
 const SPLIT_MIN: u16 = 20;
 
-/// Everything that a screen shows.
 pub(super) struct ScreenModel<'a> {
     pub(super) model: &'a Model,
     pub(super) app: &'a App,
@@ -42,7 +41,6 @@ pub(super) struct ScreenModel<'a> {
     pub(super) palette: Palette,
 }
 
-/// An output line as it is shown.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct OutputText {
     pub(super) level: rohrpost::common::OutputLevel,

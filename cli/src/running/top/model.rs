@@ -91,9 +91,7 @@ pub(super) struct Row {
     #[serde(flatten)]
     pub(super) line: ModuleLine,
     pub(super) class: String,
-    /// Packages lost a second.
     pub(super) lost_per_s: Option<f64>,
-    /// Packages sent a second.
     pub(super) sent_per_s: Option<f64>,
     /// Waiting times of the packages that it took in the interval; none without any.
     pub(super) waited_p50_s: Option<f64>,

@@ -22,14 +22,12 @@ pub(super) struct Output {
     lines: VecDeque<OutputLine>,
     /// The collector's incarnation that `next` belongs to; none before its first answer.
     incarnation: Option<u32>,
-    /// Number of the next line.
     next: u64,
     /// Why there are no lines.
     pub(super) silence: Option<String>,
 }
 
 impl Output {
-    /// For the installation's collector.
     pub(super) fn new(installation: &Installation) -> Self {
         let collector = collector(installation).filter(|name| installation.module(*name).is_some());
         let silence = collector.is_none().then(|| "the configuration has no module `output.0`".into());

@@ -31,7 +31,6 @@ pub(super) struct LanView {
     pub(super) peers: Vec<PeerNode>,
 }
 
-/// A port that a router needs.
 #[derive(Clone, Debug)]
 pub(super) struct Port {
     pub(super) what: &'static str,
