@@ -70,7 +70,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(if report.is_sound() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Nodes that a launch runs now.
 fn launched() -> Vec<PathBuf> {
     let entries = fs::read_dir(base_directory()).into_iter().flatten().flatten();
     let paths = entries.map(|entry| entry.path());

@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-/// A time daemon.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Daemon {
     /// Its name in the kernel: 15 bytes at most.

@@ -2,22 +2,23 @@
 
 mod all;
 mod log_lines;
-mod sockets;
 
 use super::manager::Manager;
 use crate::look::summary::{ModuleLine, module_lines, print_modules_live};
 use crate::running::call::level_of;
 use crate::terminal::speech::Speech;
+use crate::terminal::units::counted;
 use crate::terminal::{Failure, columns, folded, rows};
 pub(super) use all::{LaunchedNodes, lab};
 use log_lines::LogLines;
 use rohrpost::output::plain::Lines;
-use rohrpost_config::{Installation, Keys};
+use rohrpost_config::{Installation, Keys, Module, Replica};
 use rohrpost_launch::launcher::Phase;
 use rohrpost_launch::survey::Survey;
 use rohrpost_launch::{Launch, choose_node, events};
 use rohrpost_routers::impair;
 use std::io::IsTerminal;
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -102,7 +103,7 @@ fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     let mut manager = Manager::from_environment(|warning| speech.complain(warning));
     manager.starting(&node);
     let resolved = crate::look::resolved::of_node(&installation, &node);
-    let sockets = sockets::of(installation.clone(), node.clone());
+    let sockets = router_sockets(installation.clone(), node.clone());
     let mut launch =
         Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, &resolved, sockets)?;
     manager.ready(&launch);
@@ -160,9 +161,8 @@ impl<'a> TerminalView<'a> {
     fn began(&self, launch: &Launch, node: &str) {
         if !self.live {
             let modules = launch.phases().filter(|(_, phase)| *phase != Phase::LeftOut).count();
-            let word = if modules == 1 { "module" } else { "modules" };
             let runs = all::runs(node, &launch.installation().name);
-            self.speech.say(&format!("{runs}: {modules} {word}"));
+            self.speech.say(&format!("{runs}: {}", counted(modules as u64, "module")));
         }
     }
 
@@ -237,4 +237,20 @@ fn keep_last(shown: &mut Vec<String>, news: Vec<String>) {
     shown.extend(news);
     let excess = shown.len().saturating_sub(NOTES_MAX);
     shown.drain(..excess);
+}
+
+/// What launch keeps for a node's modules: the sockets of its router.
+fn router_sockets(installation: Arc<Installation>, node: String) -> impl Fn(&Module) -> Vec<OwnedFd> {
+    move |module| {
+        let network = installation.network.filter(|_| installation.router_of(&node) == Some(module.name));
+        let address = installation.node(&node).and_then(|node| node.address);
+        let (Some(network), Some(address)) = (network, address) else { return Vec::new() };
+        let others = installation.lan_nodes().iter().filter(|other| other.name != node);
+        let peers: Vec<_> = others.filter_map(|other| other.address).collect();
+        // Also where a stream is written: parts of it are asked for again.
+        let is_end =
+            |replica: &Replica| replica.to.contains(&node) || installation.node_of(replica.from) == Some(node.as_str());
+        let replicas = installation.replica_port().filter(|_| installation.replicas.iter().any(is_end));
+        rohrpost_routers::shell::listen(address, (network.port, [installation.rest_port(), replicas]), &peers)
+    }
 }

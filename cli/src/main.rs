@@ -22,9 +22,8 @@ mod nodes;
 mod quota;
 mod record;
 mod replay;
-mod router;
+mod routers;
 mod running;
-mod tcp;
 mod terminal;
 
 use begin::{check, demo, interface, new};
@@ -116,11 +115,11 @@ enum Command {
     /// Run a built-in module by hand.
     Run(run::Arguments),
     /// Carry packages between this node and the others.
-    Router(router::Arguments),
+    Router(routers::LanArguments),
     /// Carry packages beyond the LAN: the server.
-    TcpRouter(tcp::Arguments),
+    TcpRouter(routers::Arguments),
     /// Carry packages between this node and the TCP router.
-    TcpClient(tcp::Arguments),
+    TcpClient(routers::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -164,9 +163,9 @@ fn main() -> ExitCode {
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
-        Command::Router(arguments) => router::run(arguments),
-        Command::TcpRouter(arguments) => tcp::serve(arguments),
-        Command::TcpClient(arguments) => tcp::join(arguments),
+        Command::Router(arguments) => routers::connect(arguments),
+        Command::TcpRouter(arguments) => routers::serve(arguments),
+        Command::TcpClient(arguments) => routers::join(arguments),
     };
     result.unwrap_or_else(|error| {
         complain(error);

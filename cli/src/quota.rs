@@ -15,14 +15,12 @@ const UNPACKED_FACTOR: u64 = 256;
 /// More than a recording may ask for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 pub(crate) enum QuotaError {
-    /// Disk.
     #[error(
         "what is to be unpacked of it takes more than {} on the disk, which is the limit for a recording of its \
          length; cut a part that takes less: `rohrpost record cut`",
         size(*.0)
     )]
     Unpacked(u64),
-    /// Shared memory.
     #[error(
         "the recorded configuration asks for {} of shared memory, and a recording gets at most {}, half of what this \
          computer has free",

@@ -10,9 +10,9 @@
 //! ends the build as soon as it has another parent: the demo has ended, however that came. It prints nothing into the
 //! demo's terminal. All goes to a file, the last line of which says how far it is; the demo shows that line.
 
+use crate::Failure;
 use crate::cargo::{self, BRIDGE};
 use crate::crates::{self, Added, Crates, JSON};
-use crate::failure::Failure;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, parent_id};
@@ -82,7 +82,7 @@ pub(crate) fn shown_log() -> PathBuf {
 /// `xtask bridge-beside PID`: builds, starts the module, and ends with that process. Its standard error is the file.
 pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
     let demo = args.first().and_then(|pid| pid.parse().ok()).ok_or("of which process? It is called by `xtask demo`")?;
-    let mut build = behind(&build_command());
+    let mut build = build_command();
     eprintln!("{}", cargo::shown(&build));
     build.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
     let mut build = build.spawn().map_err(|error| format!("the build cannot be run: {error}"))?;
@@ -111,42 +111,24 @@ fn answer(word: &str) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// It says what it does, whatever the user's settings are: that is read here.
+/// Behind all else that wants to run: with the least niceness, and where `chrt` is installed, in the scheduling class for
+/// idle processors. It says what it does, whatever the user's settings are: that is read here.
 fn build_command() -> Command {
-    let mut command = cargo::cargo(&["build", "--package", BRIDGE, JSON]);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let has_chrt = std::env::split_paths(&path).any(|folder| folder.join("chrt").exists());
+    let before = ["nice", "-n", "19", "chrt", "--idle", "0"];
+    let before = if has_chrt { &before[..] } else { &before[..3] };
+    let mut command = cargo::cargo_behind(before, &["build", "--package", BRIDGE, JSON]);
     for (name, value) in [("COLOR", "never"), ("QUIET", "false"), ("VERBOSE", "false"), ("PROGRESS_WHEN", "never")] {
         command.env(format!("CARGO_TERM_{name}"), value);
     }
     command
 }
 
-/// The same command, behind all else that wants to run: with the least niceness, and where `chrt` is installed, in the
-/// scheduling class for idle processors.
-fn behind(command: &Command) -> Command {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let has_chrt = std::env::split_paths(&path).any(|folder| folder.join("chrt").exists());
-    let mut behind = Command::new("nice");
-    behind.args(["-n", "19"]).args(has_chrt.then_some(["chrt", "--idle", "0"]).into_iter().flatten());
-    behind.arg(command.get_program()).args(command.get_args());
-    for (name, value) in command.get_envs() {
-        match value {
-            Some(value) => behind.env(name, value),
-            None => behind.env_remove(name),
-        };
-    }
-    if let Some(folder) = command.get_current_dir() {
-        behind.current_dir(folder);
-    }
-    behind
-}
-
 /// What comes from the build.
 enum News {
-    /// A line for people.
     Line(String),
-    /// A line of JSON.
     Json(String),
-    /// So many crates are needed.
     Needed(usize),
     /// One of the two streams has ended.
     End,
@@ -236,7 +218,6 @@ fn is_work(line: &str) -> bool {
     line.split_whitespace().next().is_some_and(|first| WORK.contains(&first))
 }
 
-/// Sends each line of a stream.
 fn pass_on(stream: Option<impl Read + Send + 'static>, to: Sender<News>, news: fn(String) -> News) {
     std::thread::spawn(move || {
         let lines = stream.into_iter().flat_map(|stream| BufReader::new(stream).split(b'\n'));

@@ -1,6 +1,7 @@
 //! Paths, and calls of other programs.
 
-use crate::failure::Failure;
+use crate::Failure;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::sync::OnceLock;
@@ -18,7 +19,6 @@ pub(crate) fn check_what_is_compiled() {
     CHECKED.get_or_init(|| ());
 }
 
-/// The workspace's root.
 pub(crate) fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).to_path_buf()
@@ -33,8 +33,15 @@ pub(crate) fn target() -> PathBuf {
 
 /// A call of the Cargo that called this, from the root.
 pub(crate) fn cargo(args: &[&str]) -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.args(args).current_dir(root()).env("CARGO_TARGET_DIR", target());
+    cargo_behind(&[], args)
+}
+
+/// The same call behind the words of another program that runs it.
+pub(crate) fn cargo_behind(before: &[&str], args: &[&str]) -> Command {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut words = before.iter().map(OsString::from).chain([cargo]);
+    let mut command = Command::new(words.next().unwrap_or_default());
+    command.args(words).args(args).current_dir(root()).env("CARGO_TARGET_DIR", target());
     // What `cargo xtask` has told of this package. Build scripts (ring's) run anew if they see it once and then not, so
     // all that needs them would be compiled twice: by `cargo demo`, and by `cargo build` after it.
     let ours = |name: &str| ["CARGO_PKG_", "CARGO_MANIFEST_", "CARGO_BIN_"].iter().any(|begin| name.starts_with(begin));

@@ -1,8 +1,8 @@
 //! How far a build is: the crates that are there, of all that it needs. Minutes are told nowhere: they depend on the
 //! computer, and on what else it does.
 
+use crate::Failure;
 use crate::cargo;
-use crate::failure::Failure;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::io::{BufRead, BufReader, IsTerminal};
@@ -11,7 +11,6 @@ use std::process::Stdio;
 /// What makes Cargo print a line of JSON for each thing that it has built, and all else as usual.
 pub(crate) const JSON: &str = "--message-format=json-render-diagnostics";
 
-/// Crates of a build.
 #[derive(Default)]
 pub(crate) struct Crates {
     there: BTreeSet<String>,
@@ -24,7 +23,6 @@ pub(crate) struct Crates {
 pub(crate) enum Added {
     /// Cargo found it: an earlier build made it.
     Found,
-    /// It was compiled.
     Compiled,
 }
 

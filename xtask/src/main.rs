@@ -10,18 +10,19 @@ mod cargo;
 mod checks;
 mod crates;
 mod demo;
-mod failure;
 mod fuzz;
 mod instructions;
 mod parts;
 mod picture;
-mod processor;
 mod report;
 mod stages;
 mod tsan;
 mod venv;
 
 use std::process::ExitCode;
+
+/// A failure for the user: the error, and what to do.
+type Failure = String;
 
 const HELP: &str = "\
 cargo demo [--no-gui] [ARGS...]   the same as `cargo xtask demo`

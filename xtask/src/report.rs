@@ -1,8 +1,8 @@
 //! What tests have not tested, and what they repeated: they write it to a file (see `tests/report`), a run shows it
 //! last and fails if it is more than the repository allows.
 
+use crate::Failure;
 use crate::cargo;
-use crate::failure::Failure;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,6 @@ pub(crate) fn path() -> PathBuf {
     cargo::target().join("test-report.txt")
 }
 
-/// Begins an empty report.
 pub(crate) fn begin() -> Result<(), Failure> {
     fs::create_dir_all(cargo::target())
         .and_then(|()| fs::write(path(), ""))
@@ -41,21 +40,10 @@ fn told(report: &str, allowed: &str) -> (String, Result<(), Failure>) {
     for (line, times) in lines {
         let Some((kind, rest)) = line.split_once('\t') else { continue };
         let (place, reason) = rest.split_once('\t').unwrap_or((rest, ""));
-        let note = match kind {
-            "repeated" => {
-                repeated += times;
-                ""
-            }
-            _ if allowed.contains(&reason) => {
-                skipped += times;
-                ", as tests/skipped.txt allows"
-            }
-            _ => {
-                skipped += times;
-                refused += times;
-                ""
-            }
-        };
+        let (is_repeated, is_allowed) = (kind == "repeated", allowed.contains(&reason));
+        *if is_repeated { &mut repeated } else { &mut skipped } += times;
+        refused += if is_repeated || is_allowed { 0 } else { times };
+        let note = if is_allowed && !is_repeated { ", as tests/skipped.txt allows" } else { "" };
         let times = if times > 1 { format!(" ({times} times)") } else { String::new() };
         text += &format!("    {}{times}, {place}: {reason}{note}\n", kind.to_uppercase());
     }

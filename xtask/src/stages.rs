@@ -1,9 +1,8 @@
 //! Stages of a check. Each runs, even if one before it failed, so one run shows all failures; a table of what they cost
 //! comes last.
 
-use crate::failure::Failure;
-use crate::parts::{Part, Spent};
-use crate::processor;
+use crate::Failure;
+use crate::parts::{Part, Spent, of_ended_children};
 use crate::report;
 use std::fmt::Write;
 use std::process::ExitCode;
@@ -46,11 +45,10 @@ pub(crate) fn run_all(stages: impl IntoIterator<Item = Stage>) -> ExitCode {
     if outcomes.iter().all(|outcome| outcome.result.is_ok()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Runs a stage.
 fn outcome(stage: Stage) -> Outcome {
-    let (began, before) = (Instant::now(), processor::of_ended_children());
+    let (began, before) = (Instant::now(), of_ended_children());
     let (parts, result) = (stage.run)();
-    let took = Spent { wall: began.elapsed(), processor: processor::of_ended_children() - before };
+    let took = Spent { wall: began.elapsed(), processor: of_ended_children() - before };
     let result = result.and_then(|()| within(&stage, took.processor));
     if let Err(failure) = &result {
         eprintln!("xtask: {failure}");

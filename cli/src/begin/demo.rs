@@ -2,19 +2,16 @@
 
 mod account;
 mod arguments;
-mod asked;
 mod beyond;
 mod copy;
-mod drawing;
 mod folder;
-mod gui_build;
+mod gui;
 mod incarnations;
 mod losses;
 mod masters;
 mod nodes;
 mod recording;
 mod replicas;
-mod sealed_capture;
 mod takeover;
 
 use crate::launch::{TerminalView, end};
@@ -23,15 +20,15 @@ use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, say};
 pub(crate) use arguments::Arguments;
 use arguments::GuiConnection;
-use asked::{FIRST_FUNCTION, map_line, running};
 pub(crate) use copy::{is_built_in, write_map};
-pub(crate) use drawing::{drawing, drawn};
 pub(crate) use folder::{Folder, remove_abandoned};
+pub(crate) use gui::{drawing, drawn};
 use recording::{DemoRecording, ONE_NODE};
-use rohrpost::Name;
 use rohrpost::common::State;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CartographerInterface, MapCounts, PlayerInterface, Progress};
+use rohrpost::{Class, Name};
+use rohrpost_config::Installation;
 use rohrpost_launch::{Launch, choose_node, events};
 use rohrpost_mailbox::{ClassTraffic, saturating_sum};
 use std::process::ExitCode;
@@ -65,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?, &resolved)?;
     let outcome = watch(arguments, long, &mut launch, &speech);
     let summary = summary(&mut launch);
-    let gui_build = gui_build::progress(arguments.gui_build.as_deref(), &launch);
+    let gui_build = gui::build_progress(arguments.gui_build.as_deref(), &launch);
     let code = end(launch, &speech);
     speech.settle();
     let recorded = recording.map(DemoRecording::end);
@@ -89,7 +86,7 @@ fn watch(arguments: &Arguments, long: Option<Duration>, launch: &mut Launch, spe
     let mut ask_at = Instant::now();
     let mut over = false;
     while launch.watch(view.wait()) {
-        view.show_with(launch, |launch| gui_build::progress(arguments.gui_build.as_deref(), launch))?;
+        view.show_with(launch, |launch| gui::build_progress(arguments.gui_build.as_deref(), launch))?;
         if !over && Instant::now() >= ask_at {
             ask_at = Instant::now() + Duration::from_millis(500);
             over = progress(launch).is_some_and(|progress| progress.finished);
@@ -150,4 +147,21 @@ fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
     text.push_str(&print_classes(launch.installation(), &survey.classes));
     text.push_str("(data and replies carry the class of the module that asked for them)\n");
     Ok((text, well))
+}
+
+/// Functions that the summary calls; their numbers in the interfaces.
+pub(super) const FIRST_FUNCTION: u16 = 16;
+
+/// The module of a class, if it runs.
+pub(super) fn running(installation: &Installation, class: &str) -> Option<Name> {
+    let class: Class = installation.classes.id(class)?;
+    installation.modules.iter().flat_map(|module| module.names()).find(|name| name.class() == class)
+}
+
+pub(super) fn map_line(counts: &MapCounts) -> String {
+    let MapCounts { scans, odometries, mapped, without_pose, free, occupied } = counts;
+    format!(
+        "map: {scans} scans and {odometries} odometry received, {mapped} scans mapped ({without_pose} without pose), \
+         {free} cells free, {occupied} occupied\n"
+    )
 }

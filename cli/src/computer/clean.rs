@@ -2,6 +2,7 @@
 
 use crate::begin::demo::remove_abandoned;
 use crate::exact::SHARED_MEMORY;
+use crate::terminal::units::counted;
 use crate::terminal::{Failure, say};
 use rohrpost_mailbox::{Node, NodeError, base_directory, remove_base_if_empty};
 use std::path::Path;
@@ -59,21 +60,13 @@ fn text(path: &Path, outcome: &Result<Cleaned, NodeError>) -> String {
     match outcome {
         Ok(Cleaned::Removed) => format!("removed {}", path.display()),
         Ok(Cleaned::InUse { mailboxes, streams }) => {
-            let mut text =
-                format!("{} is in use; removed {} without owner", path.display(), mailboxes_text(*mailboxes));
-            match streams {
-                0 => {}
-                1 => text += ", 1 stream without writer",
-                several => text += &format!(", {several} streams without writer"),
-            }
-            text
+            let streams = Some(*streams).filter(|count| *count > 0);
+            let streams = streams.map(|count| format!(", {} without writer", counted(count as u64, "stream")));
+            let (path, mailboxes) = (path.display(), counted(*mailboxes as u64, "mailbox"));
+            format!("{path} is in use; removed {mailboxes} without owner{}", streams.unwrap_or_default())
         }
         Err(error) => format!("left alone: {error}"),
     }
-}
-
-fn mailboxes_text(count: usize) -> String {
-    if count == 1 { "1 mailbox".into() } else { format!("{count} mailboxes") }
 }
 
 fn json(path: &Path, outcome: &Result<Cleaned, NodeError>) -> serde_json::Value {

@@ -5,7 +5,7 @@
 //! their mailboxes. A module is asked only for its parameters, when one of them is to be completed.
 
 use crate::look::target::{Running, Target};
-use crate::measure::stream;
+use crate::measure::stream::item_of;
 use crate::running::call::COMMON;
 use crate::terminal::{Failure, say};
 use clap::builder::StyledStr;
@@ -18,6 +18,7 @@ use rohrpost::output::plain;
 use rohrpost::schema::Description;
 use rohrpost_config::Installation;
 use rohrpost_launch::survey::purpose;
+use rohrpost_mailbox::StreamId;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -150,12 +151,24 @@ fn mailboxes() -> Vec<CompletionCandidate> {
     all.into_iter().map(|name| candidate(running.text(name), purpose(name.local()))).collect()
 }
 
+/// Modules with streams here.
 fn streams() -> Vec<CompletionCandidate> {
-    stream::completed_names(&target()).iter().map(|name| candidate(name, "")).collect()
+    let Ok(running) = target().find() else { return Vec::new() };
+    let mut names: Vec<Name> = running.node.streams().unwrap_or_default().iter().map(|id| id.name).collect();
+    names.dedup();
+    names.into_iter().map(|name| candidate(running.text(name), "")).collect()
 }
 
+/// Streams of the module that one of the words names: by name, with a text, where that is known.
 fn stream_items() -> Vec<CompletionCandidate> {
-    stream::completed_items(&target(), &words()).iter().map(|(item, text)| candidate(item, text)).collect()
+    let Ok(running) = target().find() else { return Vec::new() };
+    let named = words().iter().find_map(|word| running.name(word).ok());
+    let all = running.node.streams().unwrap_or_default().into_iter().filter(|id| Some(id.name) == named);
+    let item = |id: StreamId| match item_of(&running, id) {
+        Some(item) => candidate(item.field.name, &item.field.text),
+        None => candidate(id.number.to_string(), ""),
+    };
+    all.map(item).collect()
 }
 
 fn nodes() -> Vec<CompletionCandidate> {
@@ -174,7 +187,7 @@ fn own_functions() -> Vec<CompletionCandidate> {
 }
 
 fn functions() -> Vec<CompletionCandidate> {
-    own_functions().into_iter().chain(COMMON.iter().map(|(name, text)| candidate(*name, text))).collect()
+    own_functions().into_iter().chain(COMMON.iter().map(|(name, text, _)| candidate(*name, text))).collect()
 }
 
 fn data() -> Vec<CompletionCandidate> {
@@ -186,9 +199,7 @@ fn parameters() -> Vec<CompletionCandidate> {
     let found = target().find().ok().and_then(|running| {
         let name = named(&running)?;
         let mut tool = running.join(PATIENCE).ok()?;
-        let answer = tool.parameters(name).ok();
-        tool.close();
-        answer
+        tool.parameters(name).ok()
     });
     found.unwrap_or_default().iter().map(|parameter| candidate(&parameter.field.name, &parameter.field.text)).collect()
 }
@@ -204,13 +215,11 @@ fn call_arguments() -> Vec<CompletionCandidate> {
     }
 }
 
-/// The description of the module that the words name.
 fn described() -> Option<Description> {
     let running = target().find().ok()?;
     running.describe(named(&running)?).ok()
 }
 
-/// The module that the words name.
 fn named(running: &Running) -> Option<Name> {
     let classes = &running.installation.classes;
     words().iter().find_map(|word| classes.parse_module(word).ok())

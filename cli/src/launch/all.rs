@@ -83,8 +83,11 @@ struct Node {
 }
 
 enum NodeEvent {
-    /// A node printed a line.
-    Line { node: usize, text: String, complaint: bool },
+    Line {
+        node: usize,
+        text: String,
+        complaint: bool,
+    },
     /// One of its two streams has ended.
     Closed,
     /// A stop was requested, or a child may have ended.

@@ -1,18 +1,14 @@
 //! `launch --log`: what the modules of a node say, asked of the collector page by page. Nothing here waits for it.
 
-use crate::running::log::LINES_FROM;
+use crate::running::log::{LINES_FROM, POLL, collector};
 use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
-use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost_builtin::format::Format;
 use rohrpost_config::Installation;
 use rohrpost_launch::Launch;
 use std::time::{Duration, Instant};
-
-/// New lines are asked for so often.
-const POLL: Duration = Duration::from_millis(200);
 
 /// The lines that come, of this severity and above.
 pub(super) struct LogLines {
@@ -21,7 +17,6 @@ pub(super) struct LogLines {
     collector: Name,
     /// The collector's incarnation that `next` belongs to.
     incarnation: Option<u32>,
-    /// Number of the next line.
     next: u64,
     /// The question that is under way.
     call: Option<u32>,
@@ -34,9 +29,8 @@ impl LogLines {
     /// # Errors
     /// When nobody collects what modules say.
     pub(super) fn new(installation: &Installation, node: &str, least: OutputLevel) -> Result<Self, Failure> {
-        let class = installation.classes.id(CollectorInterface::CLASS);
-        let collector = class.map(|class| Name::new(installation.system.id, class.0, 0, 0));
-        let collector = collector.filter(|name| installation.module(*name).is_some()).ok_or_else(|| {
+        let collector = collector(installation).filter(|name| installation.module(*name).is_some());
+        let collector = collector.ok_or_else(|| {
             format!(
                 "--log shows what the collector of output has, and {} has none; add a module with `builtin \
                  = \"output\"`",

@@ -11,7 +11,6 @@ use crate::look::observer::{PATIENCE, Silence, silence};
 use crate::look::summary::Account;
 use crate::look::target::Running;
 use crate::terminal::Failure;
-use rohrpost::ToolLink;
 use rohrpost::common::GET_DATA;
 use rohrpost::description::noted;
 use rohrpost::interface::DataPort;
@@ -20,6 +19,7 @@ use rohrpost::output::plain;
 use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::wire::{append, from_bytes};
+use rohrpost::{CallError, ToolLink};
 use rohrpost_config::Installation;
 use rohrpost_launch::launcher::{SnapshotRequest, launcher_of};
 use rohrpost_launch::survey::{MailboxSnapshot, Scope, Snapshot, Standing, Survey, look_at_all};
@@ -54,7 +54,6 @@ impl Running {
         nodes.iter().map(look).collect()
     }
 
-    /// Observes one node.
     pub(crate) fn look(&self, node: &str, scope: Scope) -> Result<Survey, Failure> {
         match self.look_at(&[node], scope)?.pop() {
             Some(seen) => seen.map_err(|silence| silence.text().into()),
@@ -74,17 +73,17 @@ impl Running {
 
     /// Observes all selected nodes, and merges them into one survey; for a silent node it lists the configured modules.
     pub(crate) fn survey(&self, scope: Scope) -> Result<(Survey, Vec<Silence>), Failure> {
-        let mut silent = Vec::new();
-        let mut surveys = Vec::new();
-        for seen in self.look_at(&self.shown(), scope)? {
-            match seen {
-                Ok(survey) => surveys.push(survey),
-                Err(silence) => silent.push(silence),
-            }
-        }
+        let (survey, mut silent) = self.joined(self.look_at(&self.shown(), scope)?);
         self.add_since(&mut silent);
+        Ok((survey, silent))
+    }
+
+    /// Merges what nodes have reported, or why they do not answer.
+    pub(crate) fn joined(&self, seen: impl IntoIterator<Item = Result<Survey, Silence>>) -> (Survey, Vec<Silence>) {
+        let mut silent = Vec::new();
+        let surveys = seen.into_iter().filter_map(|seen| seen.map_err(|silence| silent.push(silence)).ok()).collect();
         let names: Vec<&str> = silent.iter().map(|silence| silence.node.as_str()).collect();
-        Ok((Survey::joined(surveys, &names, &self.installation), silent))
+        (Survey::joined(surveys, &names, &self.installation), silent)
     }
 
     /// Since when nodes are silent, if the own router knows it.
@@ -106,11 +105,8 @@ impl Running {
         self.newest(router, RouterInterface::LINKS).ok()
     }
 
-    /// The newest value of data that a module publishes.
     fn newest<T: DeserializeOwned>(&self, module: Name, port: DataPort<T>) -> Result<T, Failure> {
-        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
-        let told = self.ask(|tool| tool.call(module, GET_DATA, (port.hash)(), write, read))?;
+        let told = self.ask(|tool| newest(tool, module, port))?;
         told.map(|(_, value)| value).map_err(|error| self.told(module, &error))
     }
 
@@ -205,8 +201,23 @@ impl Running {
 
     /// Runs a query from the tool's place on its own node.
     fn ask<T>(&self, ask: impl FnOnce(&mut ToolLink) -> T) -> Result<T, Failure> {
-        self.observer.with(|| self.join(PATIENCE), ask)
+        let mut place = self.observer.borrow_mut();
+        let tool = match place.take() {
+            Some(tool) => tool,
+            None => self.join(PATIENCE)?,
+        };
+        Ok(ask(place.insert(tool)))
     }
+}
+
+/// The newest value of data that a module publishes, and when it did.
+pub(crate) fn newest<T: DeserializeOwned>(
+    tool: &mut ToolLink,
+    module: Name,
+    port: DataPort<T>,
+) -> Result<(u64, T), CallError> {
+    let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+    tool.call(module, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes))
 }
 
 /// A name as users type it. A class alone is its one module, of the configuration or with mailboxes `here`.

@@ -1,6 +1,5 @@
 //! A tool's observer of other nodes: its place among the callers, and why a node does not answer.
 
-use crate::terminal::Failure;
 use crate::terminal::units::short;
 use rohrpost::output::plain;
 use rohrpost::{CallError, Fault, ToolLink};
@@ -10,36 +9,39 @@ use rohrpost_launch::launcher::launcher_of;
 use rohrpost_launch::survey::LookFailure;
 use rohrpost_mailbox::{SendError, realtime_ns};
 use serde::Serialize;
-use std::cell::RefCell;
+use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
 /// Timeout for another node's report or a module's description.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(1);
 
-/// A tool's place among the callers. It is taken when the tool first asks another node, and released on drop.
-#[derive(Default)]
-pub(crate) struct Observer(RefCell<Option<ToolLink>>);
+/// A tool's place among the callers; released on drop.
+pub(crate) struct Tool(Option<ToolLink>);
 
-impl Observer {
-    /// Asks from this place; `join` takes it if necessary.
-    pub(crate) fn with<T>(
-        &self,
-        join: impl FnOnce() -> Result<ToolLink, Failure>,
-        ask: impl FnOnce(&mut ToolLink) -> T,
-    ) -> Result<T, Failure> {
-        let mut tool = self.0.borrow_mut();
-        let link = match tool.take() {
-            Some(link) => link,
-            None => join()?,
-        };
-        Ok(ask(tool.insert(link)))
+impl Tool {
+    pub(crate) fn new(link: ToolLink) -> Self {
+        Self(Some(link))
     }
 }
 
-impl Drop for Observer {
+impl Deref for Tool {
+    type Target = ToolLink;
+
+    fn deref(&self) -> &ToolLink {
+        self.0.as_ref().expect("only drop takes it")
+    }
+}
+
+impl DerefMut for Tool {
+    fn deref_mut(&mut self) -> &mut ToolLink {
+        self.0.as_mut().expect("only drop takes it")
+    }
+}
+
+impl Drop for Tool {
     fn drop(&mut self) {
-        if let Some(tool) = self.0.take() {
-            tool.close();
+        if let Some(link) = self.0.take() {
+            link.close();
         }
     }
 }
@@ -48,7 +50,6 @@ impl Drop for Observer {
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Silence {
     pub(crate) node: String,
-    /// Why, in words.
     pub(crate) why: String,
     /// For how long, as far as it is known.
     pub(crate) silent_s: Option<f64>,

@@ -8,10 +8,11 @@ use rohrpost::output::plain;
 use rohrpost_config::Installation;
 use rohrpost_launch::survey::{ModuleSurvey, Standing, Survey};
 use rohrpost_mailbox::sys::Scheduling;
-use rohrpost_mailbox::{ClassTraffic, Loss, saturating_sum};
-use serde::Serialize;
+use rohrpost_mailbox::{ClassTraffic, Latency, Loss, saturating_sum};
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::iter;
+use std::time::Duration;
 
 /// A module, as the tables show it.
 #[derive(Clone, Serialize)]
@@ -39,7 +40,6 @@ pub(crate) struct Account {
     attempt: Option<u32>,
     /// and the number at which launch gives up.
     attempts_max: Option<u32>,
-    /// The last error.
     pub(crate) error: Option<String>,
     pub(crate) restarts: u32,
 }
@@ -193,6 +193,42 @@ impl Losses {
             replaced: counts[Loss::Replaced as usize],
         }
     }
+}
+
+/// A bucket of waiting times.
+#[derive(Serialize)]
+pub(crate) struct Bar {
+    #[serde(rename = "from_s", serialize_with = "in_seconds")]
+    pub(crate) from: Duration,
+    #[serde(rename = "to_s", serialize_with = "in_seconds")]
+    pub(crate) to: Duration,
+    pub(crate) packages: u64,
+    /// Characters of the bar: one in a million is visible, too.
+    #[serde(skip)]
+    pub(crate) length: usize,
+}
+
+fn in_seconds<S: Serializer>(time: &Duration, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_f64(time.as_secs_f64())
+}
+
+/// Characters of the longest bar.
+const BAR: f64 = 40.0;
+
+/// One bucket for each octave, from the first to the last that is not empty.
+pub(crate) fn bars(latency: &Latency) -> Vec<Bar> {
+    let octaves = latency.buckets.chunks(2).map(|pair| pair.iter().map(|count| u64::from(*count)).sum::<u64>());
+    let octaves: Vec<(usize, u64)> = octaves.enumerate().collect();
+    let (first, last) = (octaves.iter().position(|it| it.1 > 0), octaves.iter().rposition(|it| it.1 > 0));
+    let Some((first, last)) = first.zip(last) else { return Vec::new() };
+    let most = octaves.iter().map(|(_, packages)| *packages).max().unwrap_or(1);
+    let bar = |(octave, packages): &(usize, u64)| Bar {
+        from: Latency::bucket_start(octave * 2),
+        to: Latency::bucket_start(octave * 2 + 2),
+        packages: *packages,
+        length: (*packages as f64 / most as f64 * BAR).ceil() as usize,
+    };
+    octaves[first..=last].iter().map(bar).collect()
 }
 
 /// Losses by cause. Replaced packages are no loss, so they are listed separately.

@@ -1,6 +1,6 @@
 //! Which running node a tool uses, and the other nodes of its system.
 
-use crate::look::observer::Observer;
+use crate::look::observer::Tool;
 use crate::terminal::Failure;
 use clap::Args;
 use rohrpost::output::plain;
@@ -10,6 +10,7 @@ use rohrpost_launch::launcher::launcher_of;
 use rohrpost_launch::survey::{Scope, Standing, node_of};
 use rohrpost_launch::{CONFIG_FILE, choose_node};
 use rohrpost_mailbox::{Name, Node, NodeError, SendError, local, node_directory};
+use std::cell::RefCell;
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
@@ -37,7 +38,8 @@ pub(crate) struct Running {
     pub(crate) node: Arc<Node>,
     /// The selected node; it may be another one, on another computer.
     only: Option<String>,
-    pub(crate) observer: Observer,
+    /// Asks other nodes; it joins when it is first needed.
+    pub(crate) observer: RefCell<Option<Tool>>,
 }
 
 impl Target {
@@ -65,7 +67,7 @@ impl Target {
             match Node::open(&node_directory(&installation.name, &config.name)) {
                 Ok(node) => {
                     let (node_name, only) = (config.name.clone(), named.map(|node| node.name.clone()));
-                    return Ok(Running { installation, node_name, node, only, observer: Observer::default() });
+                    return Ok(Running { installation, node_name, node, only, observer: RefCell::default() });
                 }
                 Err(error @ NodeError::Missing(_)) => failed = failed.or(Some(error)),
                 Err(error) => return Err(error.into()),
@@ -121,12 +123,12 @@ impl Running {
         let node = Node::open(self.node.path())?;
         let (config, node_name) = noted_config(&node)?;
         let (installation, only) = (Installation::load(&config)?, self.only.clone());
-        Ok(Self { installation, node_name, node, only, observer: Observer::default() })
+        Ok(Self { installation, node_name, node, only, observer: RefCell::default() })
     }
 
     /// Takes part as a tool.
-    pub(crate) fn join(&self, timeout: Duration) -> Result<ToolLink, Failure> {
-        Ok(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?)
+    pub(crate) fn join(&self, timeout: Duration) -> Result<Tool, Failure> {
+        Ok(Tool::new(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?))
     }
 
     /// The nodes to use when no module is named: the selected one, or all.

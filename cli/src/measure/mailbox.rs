@@ -1,6 +1,6 @@
 //! `rohrpost mailbox`: one mailbox from outside, down to its slots. It is read-only and sends nothing.
 
-use crate::look::summary::{Losses, class_name, losses, print_classes};
+use crate::look::summary::{Bar, Losses, bars, class_name, losses, print_classes};
 use crate::look::target::{Running, Target};
 use crate::terminal::table::{table, time};
 use crate::terminal::units::fine;
@@ -9,14 +9,10 @@ use rohrpost::Name;
 use rohrpost_config::{Installation, nearest};
 use rohrpost_launch::survey::{MailboxSnapshot, Scope, purpose};
 use rohrpost_mailbox::{
-    ClassTraffic, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, OverflowPolicy, Party, Priority, SlotInfo,
-    WaitingPackage, saturating_sum,
+    ClassTraffic, Loss, MailboxDetail, OverflowPolicy, Party, Priority, SlotInfo, WaitingPackage, saturating_sum,
 };
 use serde::Serialize;
 use std::process::ExitCode;
-
-/// Characters of the longest bar.
-const BAR: f64 = 40.0;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -73,7 +69,6 @@ struct PartyLine {
     stopped: bool,
 }
 
-/// Counters of one class.
 #[derive(Serialize)]
 struct ClassLine {
     class: String,
@@ -87,14 +82,6 @@ struct ClassLine {
     waited_p99_s: Option<f64>,
     waited_max_s: f64,
     waited: Vec<Bar>,
-}
-
-/// A bucket of waiting times.
-#[derive(Serialize)]
-struct Bar {
-    from_s: f64,
-    to_s: f64,
-    packages: u64,
 }
 
 #[derive(Serialize)]
@@ -230,20 +217,6 @@ impl ClassLine {
     }
 }
 
-/// One bucket for each octave, from the first to the last that is not empty.
-fn bars(latency: &Latency) -> Vec<Bar> {
-    let bar = |octave: usize| Bar {
-        from_s: Latency::bucket_start(octave * 2).as_secs_f64(),
-        to_s: Latency::bucket_start(octave * 2 + 2).as_secs_f64(),
-        packages: latency.buckets[octave * 2..][..2].iter().map(|count| u64::from(*count)).sum(),
-    };
-    let all: Vec<Bar> = (0..LATENCY_BUCKETS / 2).map(bar).collect();
-    let there = |bar: &Bar| bar.packages > 0;
-    let (first, last) = (all.iter().position(there), all.iter().rposition(there));
-    let count = first.zip(last).map_or(0, |(first, last)| last + 1 - first);
-    all.into_iter().skip(first.unwrap_or(0)).take(count).collect()
-}
-
 impl SlotLine {
     fn new(installation: &Installation, look: &MailboxSnapshot, slot: usize, seen: &SlotInfo) -> Self {
         let class = |priority: Priority| class_name(installation, Some(rohrpost::Class(priority.0)));
@@ -334,10 +307,8 @@ fn print(installation: &Installation, detail: &MailboxDetail, seen: &MailboxView
 
 /// How long the packages of a class waited.
 fn print_bars(class: &ClassLine) -> String {
-    let most = class.waited.iter().map(|bar| bar.packages).max().unwrap_or(1).max(1);
-    let rows = class.waited.iter().map(|bar| {
-        let length = (bar.packages as f64 / most as f64 * BAR).ceil() as usize;
-        [fine(bar.from_s), fine(bar.to_s), bar.packages.to_string(), "█".repeat(length)]
+    let rows = class.waited.iter().map(|Bar { from, to, packages, length }| {
+        [fine(from.as_secs_f64()), fine(to.as_secs_f64()), packages.to_string(), "█".repeat(*length)]
     });
     let head = format!("{} waited", class.class);
     table([">from", ">to", ">packages", &head], rows)

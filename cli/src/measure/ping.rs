@@ -80,7 +80,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             break;
         }
     }
-    tool.close();
     let summary = if arguments.json { rounds.json(&name) } else { rounds.text(&name) };
     say_folded(summary);
     if rounds.answered == 0 {

@@ -1,19 +1,17 @@
 //! `rohrpost send`: repeats a command, like a person at a keyboard. Unlike `call` it waits for no answer
 //! before it sends the next; answers are counted.
 
+use crate::look::observer::Tool;
 use crate::look::target::{Running, Target};
 use crate::running::call::{COMMON, body_of, names};
-use crate::terminal::units::{Stop, rate, seconds};
+use crate::terminal::units::{LOOK, Stop, rate, seconds};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::output::plain;
 use rohrpost::schema::{Description, Function, Value, decode};
-use rohrpost::{CallError, Name, ToolLink};
+use rohrpost::{CallError, Name};
 use rohrpost_mailbox::wait_any;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-
-/// Longest sleep without a check for answers and Ctrl-C.
-const LOOK: Duration = Duration::from_millis(50);
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -94,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// Why there is nothing to send. Functions that every module has, such as `off`, need no repetition.
 fn no_function(arguments: &Arguments, name: &str, description: &Description) -> String {
     let function = &arguments.function;
-    if COMMON.iter().any(|(common, _)| common == function) {
+    if COMMON.iter().any(|(common, ..)| common == function) {
         return format!("`{function}` needs no repetition: `rohrpost call {name} {function}`");
     }
     match &names(description)[..] {
@@ -111,7 +109,7 @@ struct Sending<'a> {
     interface: u32,
     body: Vec<u8>,
     timeout: Duration,
-    tool: ToolLink,
+    tool: Tool,
     /// Calls without an answer so far.
     under_way: Vec<u32>,
     counts: Counts,
@@ -204,7 +202,6 @@ impl Sending<'_> {
     }
 
     fn finish(self, json: bool) -> Result<ExitCode, Failure> {
-        self.tool.close();
         let counts = self.counts;
         if json {
             say(serde_json::to_string(&counts)?);

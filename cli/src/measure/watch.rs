@@ -160,9 +160,8 @@ impl Tracks {
         (self.tracks, self.began) = (here, true);
     }
 
-    /// The flows with their figures.
     pub(crate) fn figures(&self) -> impl Iterator<Item = (&FlowInfo, FlowFigures)> {
-        self.tracks.iter().map(|track| (&track.last, track.figures()))
+        self.tracks.iter().map(|track| (&track.last, figures(&track.window, &track.seconds)))
     }
 }
 
@@ -189,12 +188,6 @@ pub(crate) struct FlowFigures {
     pub(crate) since_last_s: f64,
     /// The same, if the next package is long overdue.
     pub(crate) silent_s: Option<f64>,
-}
-
-impl Track {
-    fn figures(&self) -> FlowFigures {
-        figures(&self.window, &self.seconds)
-    }
 }
 
 fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond>) -> FlowFigures {

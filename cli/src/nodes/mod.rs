@@ -1,6 +1,5 @@
 //! Commands for several nodes: how they hear each other, their time, their keys.
 
-pub(crate) mod carried;
 pub(crate) mod flows;
 pub(crate) mod keys;
 pub(crate) mod net;

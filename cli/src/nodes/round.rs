@@ -1,19 +1,16 @@
 //! Polls the routers of all nodes one after the other, once or repeatedly: shared by `net` and `time`.
 
+use crate::look::newest;
+use crate::look::observer::{PATIENCE, Tool};
 use crate::look::target::{Running, Target};
 use crate::terminal::Failure;
 use crate::terminal::units::{Stop, seconds};
 use rohrpost::Name;
-use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
 use rohrpost::serde::de::DeserializeOwned;
-use rohrpost::wire::{append, from_bytes};
-use rohrpost::{CallError, Fault, ToolLink};
+use rohrpost::{CallError, Fault};
 use rohrpost_config::Installation;
 use std::time::Duration;
-
-/// A router without an answer after this time is silent.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Which nodes to ask, and how often.
 #[derive(clap::Args)]
@@ -36,7 +33,7 @@ pub(crate) struct Round {
     pub(crate) running: Running,
     pub(crate) interval: Duration,
     pub(crate) stop: Stop,
-    tool: ToolLink,
+    pub(crate) tool: Tool,
 }
 
 impl Rounds {
@@ -70,21 +67,9 @@ impl Round {
         module: Name,
         port: DataPort<T>,
     ) -> Result<(u64, T), String> {
-        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let newest = self.tool.call(module, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
-        newest.map_err(|error| match error {
+        newest(&mut self.tool, module, port).map_err(|error| match error {
             CallError::Fault(_, Fault::NothingYet) => "it has just started; ask again".into(),
             error => self.running.told(module, &error).to_string(),
         })
-    }
-
-    /// The link that asks.
-    pub(crate) fn tool(&mut self) -> &mut ToolLink {
-        &mut self.tool
-    }
-
-    /// Ends the polling.
-    pub(crate) fn close(self) {
-        self.tool.close();
     }
 }

@@ -1,11 +1,17 @@
-//! How nodes keep their time slots, as tables: used by `net` and by the demo's summary.
+//! What routers carried by class, and how nodes keep their time slots, as tables: used by `net` and by the demo's
+//! summary.
 
-use crate::nodes::quantities::by_quantity;
-use crate::terminal::table::table_of;
+use crate::look::summary::class_name;
+use crate::nodes::quantities::{by_quantity, cells, heads};
+use crate::terminal::table::{table_of, time};
 use crate::terminal::units::fine;
-use rohrpost::interfaces::{SlotState, TunnelState};
+use rohrpost::Class;
+use rohrpost::interfaces::{CarriedLoss, ClassCarried, Links, SlotState, TunnelState};
 use rohrpost::schema::Schema;
+use rohrpost_config::Installation;
 use serde::Serialize;
+use std::cmp::Reverse;
+use std::time::Duration;
 
 /// A column for each node, and the reason for each silent node; empty if there are no slots.
 pub(crate) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String {
@@ -37,6 +43,30 @@ fn by_node<T: Schema + Serialize>(
 ) -> String {
     let heads = [what.to_owned()].into_iter().chain(nodes.iter().map(|(node, _)| format!(">{node}")));
     table_of(&heads.collect::<Vec<_>>(), by_quantity(nodes).into_iter().chain(last))
+}
+
+/// A row for each class and node that `is_shown`, the most urgent class first; empty without any.
+pub(crate) fn by_class<'a>(
+    installation: &Installation,
+    links: impl IntoIterator<Item = &'a Links>,
+    is_shown: fn(&ClassCarried) -> bool,
+) -> String {
+    let classes = links.into_iter().flat_map(|node| node.classes.iter().map(move |class| (node, class)));
+    let mut classes: Vec<(&Links, &ClassCarried)> = classes.filter(|(_, class)| is_shown(class)).collect();
+    classes.sort_by_key(|(_, class)| Reverse(class.class));
+    let rows = classes.iter().map(|(node, class)| {
+        let age = class.age.map_or("-".into(), |age| time(Duration::from_nanos(age.p99_ns)));
+        let before = [class_name(installation, Some(Class(class.class))), node.node.clone()];
+        cells(before, *class, [age, lost(&class.lost)])
+    });
+    let heads = heads::<ClassCarried>(&["class", "node"], &[">age p99", "lost"]);
+    if classes.is_empty() { String::new() } else { table_of(&heads, rows) }
+}
+
+/// Losses by cause in one cell.
+pub(crate) fn lost(lost: &[CarriedLoss]) -> String {
+    let words: Vec<String> = lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
+    if words.is_empty() { "none".into() } else { words.join(", ") }
 }
 
 #[cfg(test)]

@@ -41,7 +41,6 @@ const BEGINS_WITHIN: Duration = Duration::from_secs(5);
 /// How often it is asked whether the new epoch has begun.
 const BEGINS_LOOK: Duration = Duration::from_millis(100);
 
-/// A node's report of its time.
 #[derive(Clone, Debug, Default, Serialize)]
 struct NodeTime {
     node: String,
@@ -78,9 +77,7 @@ struct NodeTimes {
 pub(crate) fn run(Arguments { rounds, new_epoch }: &Arguments) -> Result<ExitCode, Failure> {
     let mut round = rounds.begin(|_| None)?;
     if *new_epoch {
-        let begun = begin_epoch(&mut round);
-        round.close();
-        say(begun?);
+        say(begin_epoch(&mut round)?);
         return Ok(ExitCode::SUCCESS);
     }
     let clock = SystemClock::open(&round.running.node);
@@ -92,7 +89,6 @@ pub(crate) fn run(Arguments { rounds, new_epoch }: &Arguments) -> Result<ExitCod
             break nodes.agree;
         }
     };
-    round.close();
     Ok(if agree || rounds.watch { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -107,7 +103,7 @@ fn begin_epoch(round: &mut Round) -> Result<String, Failure> {
             let on_lan = installation.nodes.iter().find(|node| node.reach != Reach::Tcp);
             let node = on_lan.map_or(round.running.node_name.clone(), |node| node.name.clone());
             let launcher = launcher_of(installation, &node).ok_or_else(|| format!("no node `{node}`"))?;
-            let begun = round.tool().new_epoch(launcher);
+            let begun = round.tool.new_epoch(launcher);
             begun.map_err(|error| format!("launch of node {node}: {error}"))?.saturating_sub(1)
         }
         TimeSource::Master { masters, .. } => {
@@ -119,7 +115,7 @@ fn begin_epoch(round: &mut Round) -> Result<String, Failure> {
             let master = names.iter().find(is_master).ok_or("no node is master of time: see `rohrpost time`")?;
             let router = round.running.installation.router_of(master).ok_or("the master has no router")?;
             let begun: Result<u64, NewEpochError> = round
-                .tool()
+                .tool
                 .call(router, NEW_EPOCH, RouterInterface::hash(), |_| Ok(()), |bytes| from_bytes(bytes))
                 .map_err(|error| round.running.told(router, &error))?;
             begun.map_err(|error| format!("router of node {master}: {error}"))?

@@ -62,7 +62,6 @@ pub(super) fn order(command: &ControlCommand, recorder: &RecorderTarget) -> Resu
     })?;
     let mut tool = running.join(timeout)?;
     let told = answer(command, &running, module.name, timeout, &mut tool);
-    tool.close();
     let answer = told?;
     match answer.split_once(' ') {
         Some(("ERR", why)) => Err(plain::line(why).into()),

@@ -38,31 +38,20 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Functions that every module has, in addition to those of its interface.
-pub(crate) const COMMON: [(&str, &str); 5] = [
-    ("on", "Starts its work"),
-    ("off", "Goes to its safe state"),
-    ("status", "Reports its state"),
-    ("get", "Returns the newest data of one kind"),
-    ("output-level", "Sets which lines it sends"),
+/// Functions that every module has, in addition to those of its interface: what they do, and what they take.
+pub(crate) const COMMON: [(&str, &str, &str); 5] = [
+    ("on", "Starts its work", "nothing"),
+    ("off", "Goes to its safe state", "nothing"),
+    ("status", "Reports its state", "nothing"),
+    ("get", "Returns the newest data of one kind", "the name of one kind of data"),
+    ("output-level", "Sets which lines it sends", "one level (error, warn, info, debug or trace)"),
 ];
-
-/// The argument types of a function that every module has.
-fn usage_of_common(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "on" | "off" | "status" => "nothing",
-        "get" => "the name of one kind of data",
-        "output-level" => "one level (error, warn, info, debug or trace)",
-        _ => return None,
-    })
-}
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let module = running.module(&arguments.name)?;
     let mut tool = running.join(seconds(arguments.timeout)?)?;
     let result = answer(arguments, &running, module, &mut tool);
-    tool.close();
     let (text, failed) = result.map_err(|error| running.told(module, &*error))?;
     if arguments.json {
         say(text)
@@ -93,7 +82,7 @@ fn answer(
         }
         ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|_| Value::Null)?,
         ("get", [data]) => get(running, module, data, tool)?,
-        (common, texts) if let Some(right) = usage_of_common(common) => {
+        (common, texts) if let Some((.., right)) = COMMON.iter().find(|(name, ..)| *name == common) => {
             return Err(format!("`{common}` takes {right}, not {} arguments", texts.len()).into());
         }
         (_, texts) => call(module, name, texts, tool)?,
@@ -130,16 +119,9 @@ fn get(running: &Running, module: Name, data: &str, tool: &mut ToolLink) -> Resu
     let number = item.number;
     let write = |body: &mut Vec<u8>| rohrpost::wire::append(body, &(number,));
     let bytes = tool.call(module, common::GET_DATA, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
-    let (_, value) = postcard_u64(&bytes).ok_or("the answer is too short")?;
-    Ok(decode(&item.field.ty, value)?)
-}
-
-/// A postcard u64, and the bytes after it.
-fn postcard_u64(bytes: &[u8]) -> Option<(u64, &[u8])> {
-    let end = bytes.iter().position(|byte| byte & 0x80 == 0)? + 1;
-    let (front, rest) = bytes.split_at(end);
-    let value = front.iter().rev().fold(0u64, |value, byte| value << 7 | u64::from(byte & 0x7f));
-    Some((value, rest))
+    // Behind the time, of which each byte but the last has its highest bit set.
+    let end = bytes.iter().position(|byte| byte & 0x80 == 0).ok_or("the answer is too short")?;
+    Ok(decode(&item.field.ty, &bytes[end + 1..])?)
 }
 
 fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Result<Value, Failure> {

@@ -1,18 +1,18 @@
 //! `rohrpost restart`, `stop` and `start`: one module of a running node, through its launch.
 
+use crate::look::observer::Tool;
 use crate::look::target::{Running, Target};
 use crate::terminal::{Failure, say};
+use rohrpost::CallError;
 use rohrpost::output::plain;
-use rohrpost::{CallError, ToolLink};
 use rohrpost_launch::launcher::{AskLaunch, ChildState, ControlError, Phase};
 use rohrpost_launch::survey::Scope;
-use rohrpost_mailbox::{ModuleState, Name};
+use rohrpost_mailbox::{ModuleState, Name, ParticipantInfo};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 /// Launch answers within this time: it waits for nobody.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How often the progress is polled.
 const POLL: Duration = Duration::from_millis(20);
 /// Added to the module's own limits: time for a killed process to end, and for launch to notice.
 const MARGIN: Duration = Duration::from_secs(7);
@@ -68,20 +68,17 @@ pub(crate) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
     let tool = running.join(PATIENCE)?;
     let began = Instant::now();
     let mut asked = ModuleOrder { running: &running, name: module.name, text, launcher, tool, began, timeout };
-    let result = asked.carry_out(order, !arguments.no_wait);
-    asked.tool.close();
-    say(result?);
+    say(asked.carry_out(order, !arguments.no_wait)?);
     Ok(ExitCode::SUCCESS)
 }
 
-/// An order, and the module it is about.
 struct ModuleOrder<'a> {
     running: &'a Running,
     name: Name,
     text: String,
     /// Launch of the module's node.
     launcher: Name,
-    tool: ToolLink,
+    tool: Tool,
     began: Instant,
     timeout: Duration,
 }
@@ -130,12 +127,11 @@ impl ModuleOrder<'_> {
     /// Its process runs, and was switched on if required. The module itself reports its state.
     fn at_work(&mut self, child: &ChildState, before: &str) -> Result<String, Failure> {
         let (text, pid, took_s) = (&self.text, child.pid.unwrap_or_default(), self.began.elapsed().as_secs_f64());
-        let survey = self.running.look(self.running.node_of(self.name), Scope::Module(self.name.raw()))?;
-        let process = survey.module(self.name).and_then(|module| module.process.as_ref());
-        let state = process.filter(|process| process.pid == pid).and_then(|process| process.state);
+        let process = self.process()?.filter(|process| process.pid == pid);
+        let state = process.and_then(|process| process.state);
         if state == Some(ModuleState::Error) {
-            let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
-            return Err(format!("{text} was started (process {pid}), but is in error: {}", plain::line(&why)).into());
+            let (text, why) = (text.clone(), self.error());
+            return Err(format!("{text} was started (process {pid}), but is in error: {why}").into());
         }
         let state = state.map_or("gone", ModuleState::name);
         Ok(format!("{text} runs and is {state} after {took_s:.2} s (process {pid}{before})"))
@@ -143,26 +139,32 @@ impl ModuleOrder<'_> {
 
     /// Why it is not started, as `rohrpost list` and a call of it have it.
     fn runs_already(&mut self) -> Failure {
-        let (text, running) = (&self.text, self.running);
-        let survey = running.look(running.node_of(self.name), Scope::Module(self.name.raw())).ok();
-        let module = survey.as_ref().and_then(|survey| survey.module(self.name));
-        let state = module.and_then(|module| module.process.as_ref()?.state);
-        match state {
-            Some(ModuleState::Error) => {
-                let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
-                format!(
-                    "{text} runs, but is in error: {}; `rohrpost call {text} on` tries again, `rohrpost restart \
-                     {text}` starts it anew",
-                    plain::line(&why)
-                )
-            }
+        let text = self.text.clone();
+        match self.process().ok().flatten().and_then(|process| process.state) {
+            Some(ModuleState::Error) => format!(
+                "{text} runs, but is in error: {}; `rohrpost call {text} on` tries again, `rohrpost restart {text}` \
+                 starts it anew",
+                self.error()
+            ),
             Some(ModuleState::Off) => {
                 format!("{text} runs already, and is off; `rohrpost call {text} on` switches it on")
             }
             Some(ModuleState::Starting) => format!("{text} is starting already"),
-            _ => ControlError::Running(text.clone()).to_string(),
+            _ => ControlError::Running(text).to_string(),
         }
         .into()
+    }
+
+    /// The module's process, as its node has it.
+    fn process(&self) -> Result<Option<ParticipantInfo>, Failure> {
+        let survey = self.running.look(self.running.node_of(self.name), Scope::Module(self.name.raw()))?;
+        Ok(survey.module(self.name).and_then(|module| module.process.clone()))
+    }
+
+    /// Its last error, as it says itself.
+    fn error(&mut self) -> String {
+        let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
+        plain::line(&why).into_owned()
     }
 
     fn wait_stopped(&mut self) -> Result<String, Failure> {

@@ -1,5 +1,6 @@
 //! `rohrpost echo`: prints the data that a module publishes, using the module's own description.
 
+use crate::look::observer::PATIENCE;
 use crate::look::target::{Running, Target};
 use crate::measure::stream::too_large_for_data;
 use crate::terminal::{Failure, complain, say, say_folded};
@@ -13,7 +14,6 @@ use std::time::{Duration, Instant};
 
 /// Lease of a subscription; it is renewed three times in this time.
 const LEASE: Duration = Duration::from_secs(3);
-const PATIENCE: Duration = Duration::from_secs(1);
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -46,7 +46,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let module = running.module(&arguments.name)?;
     let mut tool = running.join(PATIENCE)?;
     let result = echo(arguments, &running, module, &mut tool);
-    tool.close();
     result.map(|()| ExitCode::SUCCESS).map_err(|error| running.told(module, &*error))
 }
 

@@ -181,7 +181,6 @@ fn beyond(running: &Running, hosts: &BeyondHosts) -> Vec<BeyondLine> {
     hosts.hosts.iter().filter(is_other).map(line).collect()
 }
 
-/// Mailboxes, one a line.
 pub(crate) fn mailbox_lines(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<MailboxLine> {
     mailboxes.iter().map(|mailbox| mailbox_line(installation, mailbox)).collect()
 }

@@ -1,39 +1,31 @@
 //! `rohrpost log`: shows the output of modules, also of recordings, and sets its level.
 
 mod arguments;
-mod filter;
 mod levels;
 mod reader;
 mod recorded;
-mod show;
 
-use crate::terminal::Failure;
+use crate::terminal::{Failure, complain, say, say_folded};
 pub(crate) use arguments::Arguments;
-use filter::Filter;
+use arguments::Filter;
 use levels::Setting;
-pub(crate) use reader::LINES_FROM;
 use reader::Reader;
-use rohrpost::Name;
-use rohrpost::interface::Interface;
-use rohrpost::interfaces::CollectorInterface;
+pub(crate) use reader::{LINES_FROM, collector};
 use rohrpost::output::OutputLine;
 use rohrpost_builtin::format::Format;
-use show::Show;
 use std::collections::VecDeque;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Polling period for new lines.
-const POLL: Duration = Duration::from_millis(200);
+pub(crate) const POLL: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if !arguments.file.is_empty() {
         return recorded::run(arguments);
     }
     let running = arguments.target.find()?;
-    let class = running.installation.classes.id(CollectorInterface::CLASS);
-    let class = class.ok_or("the configuration has no class `output`, so nobody collects output")?;
-    let collector = Name::new(running.installation.system.id, class.0, 0, 0);
+    let collector = collector(&running.installation);
+    let collector = collector.ok_or("the configuration has no class `output`, so nobody collects output")?;
     let (settings, mut filter) = Filter::read(arguments, &running.installation, &|text| running.module(text))?;
     let settings: Vec<Setting> =
         settings.iter().map(|(name, level)| Setting::read(name, level, &running)).collect::<Result<_, _>>()?;
@@ -47,21 +39,24 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let mut tool = running.join(crate::terminal::units::seconds(arguments.timeout)?)?;
     if arguments.levels {
-        let code = levels::list(&running, arguments.json, &mut tool);
-        tool.close();
-        return code;
+        return levels::list(&running, arguments.json, &mut tool);
     }
     let code = levels::set(&settings, &running, arguments, &mut tool);
     if !settings.is_empty() && !arguments.follow {
-        tool.close();
         return Ok(code);
     }
     filter.since_ns = since.map(|since| tool.clock.now().ns.saturating_sub(since.as_nanos() as u64));
     let show = Show { filter, format: Format::new(&running.installation), arguments };
     let mut reader = Reader::new(&running, collector);
-    let result = show.all(&mut reader, &mut tool);
-    tool.close();
-    result.map(|()| code)
+    show.all(&mut reader, &mut tool).map(|()| code)
+}
+
+/// Adds a line to the last ones, of which so many are kept.
+fn keep_last(last: &mut VecDeque<OutputLine>, line: OutputLine, count: usize) {
+    last.push_back(line);
+    if last.len() > count {
+        last.pop_front();
+    }
 }
 
 impl Show<'_> {
@@ -70,10 +65,7 @@ impl Show<'_> {
         // With --last, earlier lines are shown after all of them have been read.
         let mut last = VecDeque::new();
         let keep = |line: OutputLine| {
-            last.push_back(line);
-            if last.len() > self.arguments.last.unwrap_or(0) {
-                last.pop_front();
-            }
+            keep_last(&mut last, line, self.arguments.last.unwrap_or(0));
             true
         };
         if self.arguments.last.is_some() {
@@ -110,5 +102,28 @@ impl Show<'_> {
                 return Ok(true);
             }
         }
+    }
+}
+
+/// The selected lines and their format.
+struct Show<'a> {
+    filter: Filter,
+    format: Format<'a>,
+    arguments: &'a Arguments,
+}
+
+impl Show<'_> {
+    /// False when nobody reads any more.
+    fn line(&self, line: &OutputLine) -> bool {
+        if self.arguments.json { say(self.format.json(line)) } else { say_folded(self.format.short(line)) }
+    }
+
+    /// A notice of the tool between the lines; programs get only lines.
+    fn note(&self, note: &str) -> bool {
+        if self.arguments.json {
+            complain(format_args!("… {note}"));
+            return true;
+        }
+        say_folded(format_args!("… {note}"))
     }
 }

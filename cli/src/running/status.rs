@@ -34,7 +34,6 @@ struct StatusRow {
     node: String,
     #[serde(flatten)]
     account: Account,
-    /// The module's own report.
     #[serde(flatten)]
     figures: Option<ModuleFigures>,
     /// Why there is no report.
@@ -87,7 +86,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut tool = running.join(crate::terminal::units::seconds(arguments.timeout)?)?;
     let lines: Vec<StatusRow> =
         names.into_iter().map(|name| ask(&running, &mut tool, &survey, &silent, name)).collect();
-    tool.close();
     if arguments.json {
         say(serde_json::to_string(&lines)?);
     } else {

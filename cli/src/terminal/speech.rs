@@ -19,12 +19,9 @@ const WAITING_MAX: usize = 256;
 /// At the end, wait this long for the reader.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 
-/// The severity of a line, as the journal numbers it.
-#[derive(Clone, Copy)]
-enum Urgency {
-    Error = 3,
-    Notice = 5,
-}
+/// Severities of lines, as the journal numbers them.
+const ERROR: u8 = 3;
+const NOTICE: u8 = 5;
 
 /// Prints without blocking, except for a moment at the end.
 pub(crate) struct Speech {
@@ -36,8 +33,8 @@ impl Speech {
     /// For this process's standard output and standard error.
     pub(crate) fn begin() -> io::Result<Self> {
         Ok(Self {
-            out: Stream::begin("says", io::stdout(), Urgency::Notice)?,
-            err: Stream::begin("complains", io::stderr(), Urgency::Error)?,
+            out: Stream::begin("says", io::stdout(), NOTICE)?,
+            err: Stream::begin("complains", io::stderr(), ERROR)?,
         })
     }
 
@@ -68,7 +65,6 @@ impl Speech {
     }
 }
 
-/// A stream, and its queue.
 struct Stream {
     shared: Arc<Shared>,
     /// The prefix of each line in the journal; empty elsewhere.
@@ -82,8 +78,8 @@ struct Shared {
 }
 
 impl Stream {
-    fn begin(name: &str, stream: impl Write + AsFd + Send + 'static, urgency: Urgency) -> io::Result<Self> {
-        let mark = if is_journal(&stream) { format!("<{}>", urgency as u8) } else { String::new() };
+    fn begin(name: &str, stream: impl Write + AsFd + Send + 'static, severity: u8) -> io::Result<Self> {
+        let mark = if is_journal(&stream) { format!("<{severity}>") } else { String::new() };
         let shared = Arc::new(Shared::default());
         let (source, lost_mark) = (shared.clone(), mark.clone());
         // Never joined: it may block in a write for ever, and ends with the process.

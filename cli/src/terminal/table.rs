@@ -43,7 +43,6 @@ const GAP: usize = 2;
 /// A broken text has at least this width.
 const TEXT_MIN: usize = 12;
 
-/// The head of a column.
 struct Head<'a> {
     text: &'a str,
     is_number: bool,

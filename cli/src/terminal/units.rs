@@ -64,6 +64,12 @@ impl Stop {
     }
 }
 
+/// So many of a thing, in words: `1 day`, `2 mailboxes`.
+pub(crate) fn counted(count: impl Into<u128>, one: &str) -> String {
+    let (count, end) = (count.into(), if one.ends_with('x') { "es" } else { "s" });
+    if count == 1 { format!("1 {one}") } else { format!("{count} {one}{end}") }
+}
+
 /// A short time given in seconds, in the unit that suits it.
 pub(crate) fn short(seconds: f64) -> String {
     time(Duration::try_from_secs_f64(seconds).unwrap_or_default())

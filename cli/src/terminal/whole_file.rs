@@ -5,7 +5,6 @@ use std::io::{self, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-/// Mode of a new file.
 const MODE: u32 = 0o644;
 
 /// Replaces a file, or makes it: a reader, also after a power cut, finds the old one or the new one. A symbolic link

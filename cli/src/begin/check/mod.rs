@@ -1,15 +1,15 @@
 //! `rohrpost check`, and reading a configuration with every check that is possible before anything runs.
 
-mod json;
-mod memory;
-mod recorded;
+mod notes;
 
 use crate::computer::doctor;
 use crate::daemons;
+use crate::look::resolved;
 use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost_config::{Errors, Flow, Installation, MissingProgram, TimeSource, explain};
 use rohrpost_mailbox::base_directory;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -56,7 +56,7 @@ pub(crate) fn validate(installation: Installation) -> Result<Installation, Error
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let installation = match load(&arguments.file) {
         Err(errors) if arguments.json => {
-            say(json::errors(&errors));
+            say(errors_json(&errors));
             return Ok(ExitCode::FAILURE);
         }
         loaded => loaded?,
@@ -67,13 +67,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let missing = missing_programs(&installation, only)?;
     let mut notes = separated_by_size(&installation);
-    notes.extend(recorded::too_large(&installation));
+    notes.extend(notes::records_too_large(&installation));
     notes.extend(daemons_here(&installation, Path::new("/proc")));
     let base = base_directory();
     let room = doctor::room_of_nodes(&base);
-    notes.extend(room.into_iter().flat_map(|room| memory::too_small(&installation, only, &base, room)));
+    notes.extend(room.into_iter().flat_map(|room| notes::too_small(&installation, only, &base, room)));
     if arguments.json {
-        say(json::installation(&installation, only, &missing, &notes));
+        say(installation_json(&installation, only, &missing, &notes));
         return Ok(ExitCode::SUCCESS);
     }
     say(explain(&installation, only).trim_end());
@@ -122,6 +122,35 @@ fn missing_programs(installation: &Installation, only: Option<&str>) -> Result<V
     let beside = std::env::current_exe()?.parent().map(PathBuf::from).unwrap_or_default();
     let nodes = installation.nodes.iter().filter(|node| only.is_none_or(|name| name == node.name));
     Ok(nodes.flat_map(|node| installation.missing_programs(&node.name, &beside)).collect())
+}
+
+/// A file with mistakes.
+pub(super) fn errors_json(errors: &Errors) -> Value {
+    let file = errors.path().display().to_string();
+    let problems = errors.problems().iter();
+    let problems: Vec<Value> =
+        problems.map(|problem| json!({ "file": file, "line": problem.line, "message": problem.message })).collect();
+    json!({ "file": file, "right": false, "errors": problems })
+}
+
+/// A correct file, as `explain` describes it. `notes`: additional hints for people.
+pub(super) fn installation_json(
+    installation: &Installation,
+    only: Option<&str>,
+    missing: &[MissingProgram],
+    notes: &[String],
+) -> Value {
+    let missing = missing.iter().map(|program| {
+        let module = installation.classes.format(program.module);
+        json!({ "module": module, "optional": program.optional, "message": program.message })
+    });
+    json!({
+        "file": installation.path.display().to_string(),
+        "right": true,
+        "installation": resolved::of(installation, only),
+        "missing_programs": missing.collect::<Vec<_>>(),
+        "notes": notes,
+    })
 }
 
 #[cfg(test)]

@@ -1,14 +1,13 @@
 //! Traffic through the TCP router in the demo, as its clients count it; and the losses when it died.
 
+use crate::look::newest;
 use crate::look::summary::class_name;
-use crate::nodes::carried::lost;
 use crate::nodes::net;
+use crate::nodes::slots::lost;
 use crate::terminal::Failure;
 use crate::terminal::table::table;
-use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{BeyondLink, BeyondState, CarriedLoss, ClassPassed, TcpInterface};
-use rohrpost::wire::{append, from_bytes};
-use rohrpost::{CallError, Class, ToolLink};
+use rohrpost::{Class, ToolLink};
 use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 
@@ -17,11 +16,9 @@ pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Result<Ve
     let mut links = Vec::new();
     for node in &installation.nodes {
         let Some(client) = installation.tcp_client_of(&node.name) else { continue };
-        let port = TcpInterface::LINK;
-        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let told = tool.call(client, GET_DATA, (port.hash)(), write, |bytes| from_bytes::<(u64, BeyondLink)>(bytes));
-        let named = |error: CallError| format!("client of the TCP router on {}: {error}", node.name);
-        links.push(told.map(|(_, link)| link).map_err(named)?);
+        let named = |error| format!("client of the TCP router on {}: {error}", node.name);
+        let (_, link) = newest(tool, client, TcpInterface::LINK).map_err(named)?;
+        links.push(link);
     }
     Ok(links)
 }

@@ -6,9 +6,19 @@ use rohrpost_config::Installation;
 use rohrpost_mailbox::{Node, NodeError, ParticipantProcess, ProcessError, monotonic_ns, node_directory};
 use std::sync::Arc;
 
+/// What a router carries packages to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum RouterKind {
+    /// Other nodes of the LAN.
+    Lan,
+    /// Everything beyond it.
+    Tcp,
+}
+
 /// A router that died.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Death {
+    pub(super) kind: RouterKind,
     /// Its node, by its place in the configuration.
     pub(super) node: usize,
     /// The process.
@@ -19,8 +29,8 @@ pub(super) struct Death {
     pub(super) again: Option<(u32, u64)>,
 }
 
-/// A node with a watched router.
 struct WatchedNode {
+    kind: RouterKind,
     /// By its place in the configuration.
     index: usize,
     node: Arc<Node>,
@@ -31,23 +41,25 @@ struct WatchedNode {
     refused: Option<String>,
 }
 
-/// Watches routers, at most one of each node, in the tables of the nodes' shared memory: it sends nothing.
+/// Watches routers, at most one of a kind on each node, in the tables of the nodes' shared memory: it sends nothing.
 pub(super) struct Incarnations {
     nodes: Vec<WatchedNode>,
     pub(super) deaths: Vec<Death>,
 }
 
 impl Incarnations {
-    /// The routers of running nodes.
-    pub(super) fn of(installation: &Installation, router: impl Fn(&str) -> Option<Name>) -> Result<Self, NodeError> {
-        let watched = |(index, config): (usize, &rohrpost_config::Node)| {
-            let router = router(&config.name)?;
-            let node = Node::open(&node_directory(&installation.name, &config.name));
-            Some(node.map(|node| WatchedNode { index, node, router, process: None, refused: None }))
-        };
-        let nodes: Result<Vec<WatchedNode>, NodeError> =
-            installation.nodes.iter().enumerate().filter_map(watched).collect();
-        let mut incarnations = Self { nodes: nodes?, deaths: Vec::new() };
+    pub(super) fn of(installation: &Installation) -> Result<Self, NodeError> {
+        let mut nodes = Vec::new();
+        for (index, config) in installation.nodes.iter().enumerate() {
+            let is_here = |router: &Name| installation.node_of(*router) == Some(&config.name);
+            let tcp = installation.tcp_router().filter(is_here);
+            let routers = [(RouterKind::Lan, installation.router_of(&config.name)), (RouterKind::Tcp, tcp)];
+            for (kind, router) in routers.into_iter().filter_map(|(kind, router)| Some((kind, router?))) {
+                let node = Node::open(&node_directory(&installation.name, &config.name))?;
+                nodes.push(WatchedNode { kind, index, node, router, process: None, refused: None });
+            }
+        }
+        let mut incarnations = Self { nodes, deaths: Vec::new() };
         incarnations.look();
         Ok(incarnations)
     }
@@ -55,17 +67,17 @@ impl Incarnations {
     /// Checks which routers died, and which came back.
     pub(super) fn look(&mut self) {
         for watched in &mut self.nodes {
-            let index = watched.index;
+            let (kind, node) = (watched.kind, watched.index);
             match &watched.process {
                 Some(process) if process.has_ended() => {
                     let pid = process.pid();
                     watched.process = None;
-                    self.deaths.push(Death { node: index, pid, at_ns: monotonic_ns(), again: None });
+                    self.deaths.push(Death { kind, node, pid, at_ns: monotonic_ns(), again: None });
                 }
                 Some(_) => {}
                 None => {
                     watched.found(watched.ready());
-                    let last = self.deaths.iter_mut().rev().find(|death| death.node == index);
+                    let last = self.deaths.iter_mut().rev().find(|death| (death.kind, death.node) == (kind, node));
                     if let (Some(process), Some(death)) = (&watched.process, last) {
                         death.again = Some((process.pid(), monotonic_ns()));
                     }
@@ -74,9 +86,11 @@ impl Incarnations {
         }
     }
 
-    /// Kills the router of a node, as a crash would.
-    pub(super) fn kill(&mut self, node: usize) -> Option<u32> {
-        let watched = self.nodes.iter_mut().find(|watched| watched.index == node)?;
+    /// Kills a router, as a crash would: that of this node, or the first one that is known.
+    pub(super) fn kill(&mut self, kind: RouterKind, node: Option<usize>) -> Option<u32> {
+        let is_meant =
+            |watched: &&mut WatchedNode| watched.kind == kind && node.is_none_or(|node| watched.index == node);
+        let watched = self.nodes.iter_mut().find(is_meant)?;
         let process = watched.process.as_ref()?;
         match process.kill() {
             Ok(()) => Some(process.pid()),
@@ -120,13 +134,14 @@ mod tests {
     fn a_router_that_is_not_watched_has_a_reason_until_it_is() {
         let folder = tempfile::tempdir().unwrap();
         let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
-        let watched = WatchedNode { index: 3, node, router: Name::new(1, 32, 0, 0), process: None, refused: None };
+        let (kind, router) = (RouterKind::Lan, Name::new(1, 32, 0, 0));
+        let watched = WatchedNode { kind, index: 3, node, router, process: None, refused: None };
         let mut incarnations = Incarnations { nodes: vec![watched], deaths: Vec::new() };
         incarnations.nodes[0].found(Err(ProcessError::Elsewhere));
         let told: Vec<(usize, &str)> = incarnations.refused().collect();
         assert!(matches!(told[..], [(3, why)] if why.contains("no process of this pid namespace")), "{told:?}");
         incarnations.look();
         assert_eq!(incarnations.refused().count(), 0, "there is no router, so there is nothing to be refused");
-        assert_eq!(incarnations.kill(3), None);
+        assert_eq!(incarnations.kill(RouterKind::Lan, Some(3)), None);
     }
 }

@@ -1,11 +1,50 @@
-//! The masters of time, as seen on the bridge: from when to when.
+//! The masters of time, as seen on the bridge: from when to when. The demo has the keys of sealed time datagrams, and
+//! reads them like a node that has not authenticated its peers.
 
-use super::sealed_capture::SealedCapture;
-use rohrpost_routers::frame::NodeIndex;
+use crate::terminal::Failure;
+use rohrpost_config::Installation;
+use rohrpost_router_daemon::keys;
+use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::lab::Crossing;
-use rohrpost_routers::time::Term;
+use rohrpost_routers::security::{Opening, PeerSessions, Port, RouterIdentity, TAG_BYTES};
+use rohrpost_routers::settings::Settings;
 use rohrpost_routers::time::message::{Sync, TimeMessage};
+use rohrpost_routers::time::{TIME_BYTES, Term};
 use std::collections::VecDeque;
+
+/// The incarnation of an observer that sends nothing.
+const MUTE: u64 = 1;
+
+/// By node: opens what is sealed to it. Empty where nothing is sealed.
+#[derive(Default)]
+pub(super) struct SealedCapture {
+    nodes: Vec<Opening>,
+}
+
+impl SealedCapture {
+    /// With the LAN keys of an installation, if it has some.
+    pub(super) fn of(installation: &Installation) -> Result<Self, Failure> {
+        let mut nodes = Vec::new();
+        for node in installation.lan_nodes() {
+            let Some(keys) = keys::of(installation)? else { break };
+            let settings = Settings::new(installation, &node.name, MUTE)?;
+            nodes.push(Opening::new(&PeerSessions::new(RouterIdentity::of(&settings), keys), Port::Time));
+        }
+        Ok(Self { nodes })
+    }
+
+    /// Parses a datagram of time, sealed or not.
+    pub(super) fn hear(&mut self, datagram: &[u8]) -> Option<(FrameHead, TimeMessage)> {
+        if let Ok((head, rest)) = FrameHead::parse(datagram) {
+            return Some((head, TimeMessage::parse(head.kind, rest).ok()?));
+        }
+        let mut sealed = [0; TIME_BYTES + TAG_BYTES];
+        sealed.copy_from_slice(datagram.get(..TIME_BYTES + TAG_BYTES).filter(|whole| whole.len() == datagram.len())?);
+        let ear = (0..self.nodes.len()).find(|node| self.nodes[*node].is_strange(&sealed))?;
+        let (head, rest) = self.nodes[ear].overhear(&mut sealed, |_| true).ok()?;
+        Some((head, TimeMessage::parse(head.kind, rest).ok()?))
+    }
+}
 
 /// The oldest are dropped first. On a busy computer, a master leaves out about one cycle in some hundred.
 const TERMS_MAX: usize = 10_000;
@@ -18,7 +57,6 @@ pub(super) struct MasterTerm {
     /// When its first frame crossed the bridge, monotonic ns.
     pub(super) first_ns: u64,
     pub(super) first_cycle: u64,
-    /// When its last frame did.
     pub(super) last_ns: u64,
     pub(super) last_cycle: u64,
 }

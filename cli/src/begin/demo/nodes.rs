@@ -2,28 +2,28 @@
 
 use super::account::{self, Balance};
 use super::arguments::{Arguments, GuiConnection};
-use super::asked::{FIRST_FUNCTION, map_line, running};
-use super::drawing::{drawing, drawn};
+use super::gui::{drawing, drawn};
 use super::losses::ExchangeLosses;
 use super::replicas::RecordBalance;
 use super::takeover::{TakeoverRecord, Victim, Watch};
-use super::{beyond, copy};
+use super::{FIRST_FUNCTION, beyond, copy, map_line, running};
 use crate::launch::{LaunchedNodes, lab};
+use crate::look::newest;
 use crate::look::summary::print_classes;
 use crate::nodes::vocabulary::Vocabulary;
-use crate::nodes::{carried, flows, slots};
+use crate::nodes::{flows, slots};
 use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, say};
-use rohrpost::common::{GET_DATA, State};
+use rohrpost::ToolLink;
+use rohrpost::common::State;
 use rohrpost::interface::{DataPort, Interface};
 use rohrpost::interfaces::{
     CartographerInterface, FlowStates, Links, MapCounts, ReplicaStates, RouterInterface, SlotState,
 };
-use rohrpost::wire::{append, from_bytes};
-use rohrpost::{CallError, ToolLink};
+use rohrpost::wire::from_bytes;
 use rohrpost_config::Installation;
-use rohrpost_launch::survey::Survey;
-use rohrpost_mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
+use rohrpost_launch::survey::{Survey, sum};
+use rohrpost_mailbox::{MailboxInfo, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
 use serde::de::DeserializeOwned;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -110,7 +110,8 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     let died = seen.died();
     let (links, records) = settled(installation, &mut tool, &died)?;
     let losses = ExchangeLosses::ask(installation, &mut tool);
-    let kept = in_slots(installation, &mut tool)?;
+    let kept: Option<Vec<SlotState>> =
+        installation.tdma.as_ref().map(|_| of_routers(installation, &mut tool, RouterInterface::SLOTS)).transpose()?;
     let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
     let beyond = beyond::ask(installation, &mut tool)?;
     let mut vocabulary = Vocabulary::default();
@@ -133,52 +134,39 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
         text += &format!("\n{deaths}\n");
     }
     text += &map;
-    for error in &errors {
-        text += &format!("{error}\n");
-    }
-    text += "\nOver the network; age: from the stamp of data to the mailbox on the other node:\n\n";
-    text += &carried::by_class(installation, &links, |_| true);
-    let replicas = records.table();
-    if !replicas.is_empty() {
-        text += "\nStreams by replicas; delay: from writing to the arrival of the whole record:\n\n";
-        text += &replicas;
-    }
+    text.extend(errors.iter().map(|error| format!("{error}\n")));
+    let carried = slots::by_class(installation, &links, |_| true);
+    text += &part("Over the network; age: from the stamp of data to the mailbox on the other node", &carried);
+    text += &part("Streams by replicas; delay: from writing to the arrival of the whole record", &records.table());
     text += &beyond::text(installation, &beyond, seen.tcp_router_died());
     if !verbose {
         return Ok((text, well));
     }
-    text += "\nOn the wire:\n\n";
-    text += &account::by_link(&links);
-    text += "\nIn the mailboxes of all nodes, and how long packages waited there:\n\n";
-    text += &print_classes(installation, &classes(&surveys));
+    text += &part("On the wire", &account::by_link(&links));
+    let mailboxes: Vec<MailboxInfo> = surveys.into_iter().flat_map(|survey| survey.mailboxes).collect();
+    let classes = print_classes(installation, &sum(&mailboxes));
+    text += &part("In the mailboxes of all nodes, and how long packages waited there", &classes);
     text += "(data and replies carry the class of the module that asked for them)\n";
-    if !kept.is_empty() {
-        text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
-        text += &slots::kept(&kept);
-    }
+    text += &part(
+        "In time slots; off: how far the last frames were from the beginnings of their slots",
+        &slots::kept(&kept.unwrap_or_default()),
+    );
+    text += &part("Declared flows; a slot that was late or skipped costs a cycle", &late);
     if !late.is_empty() {
-        text +=
-            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle:\n\n{late}{}", flows::legend());
+        text += &flows::legend();
     }
     if !installation.flows.is_empty() {
-        text +=
-            "\nDeclared flows from end to end, as modules count them; too late: answered after the caller's time:\n\n";
-        text += &losses;
+        text += &part(
+            "Declared flows from end to end, as modules count them; too late: answered after the caller's time",
+            &losses,
+        );
     }
     Ok((text, well))
 }
 
-/// The mailboxes of all nodes.
-fn classes(surveys: &[Survey]) -> Vec<ClassTraffic> {
-    let mut classes: Vec<ClassTraffic> = Vec::new();
-    for traffic in surveys.iter().flat_map(|survey| &survey.classes) {
-        match classes.iter_mut().find(|known| known.class == traffic.class) {
-            Some(known) => known.add(traffic),
-            None => classes.push(traffic.clone()),
-        }
-    }
-    classes.sort_by_key(|traffic| std::cmp::Reverse(traffic.class));
-    classes
+/// A part of the summary below its head; empty without content.
+fn part(head: &str, content: &str) -> String {
+    if content.is_empty() { String::new() } else { format!("\n{head}:\n\n{content}") }
 }
 
 fn map(installation: &Installation, tool: &mut ToolLink) -> String {
@@ -259,14 +247,6 @@ fn settled(
     }
 }
 
-/// How each node kept its time slots; empty where there are none.
-fn in_slots(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<SlotState>, Failure> {
-    if installation.tdma.is_none() {
-        return Ok(Vec::new());
-    }
-    of_routers(installation, tool, RouterInterface::SLOTS)
-}
-
 /// What the routers on both ends of replicas report; others report nothing of them.
 fn replicas(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<ReplicaStates>, Failure> {
     let is_end = |node: &&rohrpost_config::Node| {
@@ -277,7 +257,6 @@ fn replicas(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Repl
     ends.map(|node| of_router(installation, tool, &node.name, RouterInterface::REPLICAS)).collect()
 }
 
-/// The reports of all nodes' routers.
 fn of_routers<T: DeserializeOwned>(
     installation: &Installation,
     tool: &mut ToolLink,
@@ -294,9 +273,6 @@ fn of_router<T: DeserializeOwned>(
     data: DataPort<T>,
 ) -> Result<T, Failure> {
     let router = installation.router_of(node).ok_or("no router")?;
-    let write = |body: &mut Vec<u8>| append(body, &(data.number,));
-    let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
-    let answer = tool.call(router, GET_DATA, RouterInterface::hash(), write, read);
-    let told = |error: CallError| format!("router of {node}: {error}");
-    Ok(answer.map(|(_, told)| told).map_err(told)?)
+    let (_, told) = newest(tool, router, data).map_err(|error| format!("router of {node}: {error}"))?;
+    Ok(told)
 }

@@ -2,9 +2,8 @@
 //!
 //! A thread observes the bridge and the nodes' tables. It sends nothing, so it adds no traffic.
 
-use super::incarnations::{Death, Incarnations};
-use super::masters::{MasterTerm, Masters};
-use super::sealed_capture::SealedCapture;
+use super::incarnations::{Death, Incarnations, RouterKind};
+use super::masters::{MasterTerm, Masters, SealedCapture};
 use crate::terminal::Failure;
 use crate::terminal::table::time;
 use rohrpost_config::Installation;
@@ -35,7 +34,6 @@ pub(super) struct Watch {
 pub(super) enum Victim {
     /// The router of the present master of time.
     Master,
-    /// The TCP router.
     TcpRouter,
 }
 
@@ -44,8 +42,6 @@ pub(super) struct TakeoverRecord {
     installation: Arc<Installation>,
     began_ns: u64,
     incarnations: Incarnations,
-    /// Incarnations of the TCP router.
-    beyond: Incarnations,
     masters: Masters,
     /// Processes that were killed on purpose.
     on_purpose: Vec<u32>,
@@ -60,10 +56,7 @@ impl Watch {
         let seen = TakeoverRecord {
             installation: installation.clone(),
             began_ns: monotonic_ns(),
-            incarnations: Incarnations::of(installation, |node| installation.router_of(node))?,
-            beyond: Incarnations::of(installation, |node| {
-                installation.tcp_router().filter(|router| installation.node_of(*router) == Some(node))
-            })?,
+            incarnations: Incarnations::of(installation)?,
             masters: Masters::heard_with(SealedCapture::of(installation)?),
             on_purpose: Vec::new(),
             in_vain: 0,
@@ -72,13 +65,11 @@ impl Watch {
         Ok(Self { kill, thread, installation: installation.clone() })
     }
 
-    /// Kills a router.
     pub(super) fn kill(&self, victim: Victim) {
         // It ends only when the channel closes.
         let _ = self.kill.send(victim);
     }
 
-    /// Ends the thread.
     pub(super) fn end(self) -> Result<TakeoverRecord, Failure> {
         drop(self.kill);
         let name = &self.installation.name;
@@ -92,7 +83,6 @@ impl TakeoverRecord {
         loop {
             let word = words.recv_timeout(LOOK);
             self.incarnations.look();
-            self.beyond.look();
             looks += 1;
             if looks % READ_LOOKS == 0 || word != Err(RecvTimeoutError::Timeout) {
                 capture.drain(|crossing| self.masters.note(&crossing));
@@ -109,9 +99,9 @@ impl TakeoverRecord {
         let killed = match victim {
             Victim::Master => {
                 let master = self.masters.master_at(monotonic_ns()).map(|term| usize::from(term.node));
-                master.and_then(|node| self.incarnations.kill(node))
+                master.and_then(|node| self.incarnations.kill(RouterKind::Lan, Some(node)))
             }
-            Victim::TcpRouter => (0..self.installation.nodes.len()).find_map(|node| self.beyond.kill(node)),
+            Victim::TcpRouter => self.incarnations.kill(RouterKind::Tcp, None),
         };
         match killed {
             Some(pid) => self.on_purpose.push(pid),
@@ -122,7 +112,7 @@ impl TakeoverRecord {
     /// Nodes with more than one incarnation of the router.
     pub(super) fn died(&self) -> Vec<&str> {
         let name = |death: &Death| self.installation.nodes[death.node].name.as_str();
-        let mut names: Vec<&str> = self.incarnations.deaths.iter().map(name).collect();
+        let mut names: Vec<&str> = self.deaths(RouterKind::Lan).map(name).collect();
         names.sort_unstable();
         names.dedup();
         names
@@ -132,25 +122,29 @@ impl TakeoverRecord {
     pub(super) fn is_well(&self) -> bool {
         self.in_vain == 0
             && self.all_are_watched()
-            && self.incarnations.deaths.iter().chain(&self.beyond.deaths).all(|death| death.again.is_some())
+            && self.incarnations.deaths.iter().all(|death| death.again.is_some())
     }
 
     fn all_are_watched(&self) -> bool {
-        self.incarnations.refused().chain(self.beyond.refused()).next().is_none()
+        self.incarnations.refused().next().is_none()
+    }
+
+    fn deaths(&self, kind: RouterKind) -> impl Iterator<Item = &Death> {
+        self.incarnations.deaths.iter().filter(move |death| death.kind == kind)
     }
 
     /// Whether the TCP router had more than one incarnation.
     pub(super) fn tcp_router_died(&self) -> bool {
-        !self.beyond.deaths.is_empty()
+        self.deaths(RouterKind::Tcp).next().is_some()
     }
 
     /// The report in words; empty when no router died.
     pub(super) fn text(&self) -> String {
-        let mut text: String = self.incarnations.deaths.iter().map(|death| self.event(death)).collect();
-        for death in &self.beyond.deaths {
+        let mut text: String = self.deaths(RouterKind::Lan).map(|death| self.event(death)).collect();
+        for death in self.deaths(RouterKind::Tcp) {
             text += &format!("The TCP router {}.\n", self.death_text(death));
         }
-        for (node, why) in self.incarnations.refused().chain(self.beyond.refused()) {
+        for (node, why) in self.incarnations.refused() {
             text += &format!(
                 "A router of node {} is not watched, or was not killed: {why}.\n",
                 self.installation.nodes[node].name
@@ -160,7 +154,7 @@ impl TakeoverRecord {
             text += "no router was killed, as there was none: no master, if [time] of the configuration is without \
                 `source = \"master\"`, or no TCP router\n";
         }
-        if !self.incarnations.deaths.is_empty() {
+        if self.deaths(RouterKind::Lan).next().is_some() {
             let master = self.masters.master_at(u64::MAX).map(|term| self.name(term));
             text += &format!("Master at the end: {}.\n", master.unwrap_or("none was heard"));
         }

@@ -48,15 +48,7 @@ pub(super) struct TypedField<'a> {
 /// A type, with structs and enums by their place in [`Blueprint::types`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Layout {
-    Unit,
-    Bool,
-    /// Whether it has a sign, and its bits.
-    Whole(bool, u32),
-    F32,
-    F64,
-    Char,
-    Text,
-    Bytes,
+    Plain(&'static Plain),
     Option(Box<Layout>),
     List(Box<Layout>),
     Array(u32, Box<Layout>),
@@ -66,6 +58,51 @@ pub(super) enum Layout {
     Result(Box<Layout>, Box<Layout>),
     Named(usize),
 }
+
+impl Layout {
+    pub(super) fn is(&self, ty: &Type) -> bool {
+        matches!(self, Self::Plain(plain) if plain.ty == *ty)
+    }
+}
+
+/// A type that each language has.
+#[derive(Debug, PartialEq, Eq, Hash)]
+pub(super) struct Plain {
+    pub(super) ty: Type,
+    /// In files, and in names of functions of C.
+    pub(super) word: &'static str,
+    pub(super) rust: &'static str,
+    pub(super) python: &'static str,
+    pub(super) c: &'static str,
+    /// About how many bytes one has in C.
+    pub(super) c_bytes: u64,
+}
+
+const fn plain(ty: Type, word: &'static str, languages: [&'static str; 3], c_bytes: u64) -> Plain {
+    let [rust, python, c] = languages;
+    Plain { ty, word, rust, python, c, c_bytes }
+}
+
+/// Types without others inside.
+pub(super) static PLAIN: [Plain; 17] = [
+    plain(Type::Unit, "unit", ["()", "None", "rp_nothing"], 1),
+    plain(Type::Bool, "bool", ["bool", "bool", "bool"], 1),
+    plain(Type::U8, "u8", ["u8", "rp.U8", "uint8_t"], 1),
+    plain(Type::U16, "u16", ["u16", "rp.U16", "uint16_t"], 2),
+    plain(Type::U32, "u32", ["u32", "rp.U32", "uint32_t"], 4),
+    plain(Type::U64, "u64", ["u64", "rp.U64", "uint64_t"], 8),
+    plain(Type::U128, "u128", ["u128", "rp.U128", "rp_u128"], 16),
+    plain(Type::I8, "i8", ["i8", "rp.I8", "int8_t"], 1),
+    plain(Type::I16, "i16", ["i16", "rp.I16", "int16_t"], 2),
+    plain(Type::I32, "i32", ["i32", "rp.I32", "int32_t"], 4),
+    plain(Type::I64, "i64", ["i64", "int", "int64_t"], 8),
+    plain(Type::I128, "i128", ["i128", "rp.I128", "rp_i128"], 16),
+    plain(Type::F32, "f32", ["f32", "rp.F32", "float"], 4),
+    plain(Type::F64, "f64", ["f64", "float", "double"], 8),
+    plain(Type::Char, "char", ["char", "rp.Char", "uint32_t"], 4),
+    plain(Type::Text, "text", ["String", "str", "rp_text"], 16),
+    plain(Type::Bytes, "bytes", ["rohrpost::types::Bytes", "bytes", "rp_bytes"], 16),
+];
 
 /// A struct or an enum.
 pub(super) struct NamedType<'a> {
@@ -81,7 +118,6 @@ pub(super) enum Body<'a> {
     Enum(Vec<Variant<'a>>),
 }
 
-/// A variant of an enum.
 pub(super) struct Variant<'a> {
     pub(super) name: &'a str,
     pub(super) text: &'a str,
@@ -217,23 +253,6 @@ impl<'a> Types<'a> {
         }
         let mut inner = |ty: &'a Type| self.layout(ty, place, depth + 1).map(Box::new);
         Ok(match ty {
-            Type::Unit => Layout::Unit,
-            Type::Bool => Layout::Bool,
-            Type::U8 => Layout::Whole(false, 8),
-            Type::U16 => Layout::Whole(false, 16),
-            Type::U32 => Layout::Whole(false, 32),
-            Type::U64 => Layout::Whole(false, 64),
-            Type::U128 => Layout::Whole(false, 128),
-            Type::I8 => Layout::Whole(true, 8),
-            Type::I16 => Layout::Whole(true, 16),
-            Type::I32 => Layout::Whole(true, 32),
-            Type::I64 => Layout::Whole(true, 64),
-            Type::I128 => Layout::Whole(true, 128),
-            Type::F32 => Layout::F32,
-            Type::F64 => Layout::F64,
-            Type::Char => Layout::Char,
-            Type::Text => Layout::Text,
-            Type::Bytes => Layout::Bytes,
             Type::Option(some) => Layout::Option(inner(some)?),
             Type::List(element) => Layout::List(inner(element)?),
             Type::Array(length, element) => Layout::Array(*length, inner(element)?),
@@ -248,6 +267,10 @@ impl<'a> Types<'a> {
                 self.keep(NamedType { name, text, body, ty })
             }
             Type::Enum { name, text, variants } => self.enumeration(ty, (name, text), variants, place, depth)?,
+            ty => {
+                let plain = PLAIN.iter().find(|plain| plain.ty == *ty);
+                Layout::Plain(plain.expect("a type without others inside has a row"))
+            }
         })
     }
 

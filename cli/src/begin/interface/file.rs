@@ -3,6 +3,7 @@
 //! Reading is strict. What is not known is refused with its place, as a file that is only half understood would make
 //! code of another interface; and the hash must be that of what was read.
 
+use super::blueprint::PLAIN;
 use rohrpost::output::plain;
 use rohrpost::schema::{
     DataItem, DataKind, Description, Field, Function, Members, Named, SchemaError, TYPES_MAX, Type, Value, WalkError,
@@ -43,7 +44,6 @@ pub(super) enum FileError {
     Deep(serde_json::Error),
 }
 
-/// What is wrong at a place.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum PlaceProblem {
     #[error("expected {expected}, got `{}`", plain::line(.got))]
@@ -258,7 +258,8 @@ impl FilePlace<'_> {
     fn ty(&self) -> Result<Type, FileError> {
         const TYPE: &str = "a type, such as `f64` or {\"list\": \"f64\"}";
         if let Some(word) = self.json.as_str() {
-            return plain_type(word).ok_or_else(|| self.expected(TYPE));
+            let plain = PLAIN.iter().find(|plain| plain.word == word);
+            return plain.map(|plain| plain.ty.clone()).ok_or_else(|| self.expected(TYPE));
         }
         let (tag, json) = match self.json.as_object().map(|entries| (entries.len(), entries.iter().next())) {
             Some((1, Some(only))) => only,
@@ -324,28 +325,4 @@ fn field_of(object: &Object<'_>) -> Result<Field, FileError> {
     let (least, most) = (bound("min")?, bound("max")?);
     let field = Field::new(object.text_or_none("name")?, ty);
     Ok(field.said(object.text_or_none("text")?, object.text_or_none("unit")?).bounded(least, most))
-}
-
-/// Types that are one word.
-fn plain_type(word: &str) -> Option<Type> {
-    Some(match word {
-        "unit" => Type::Unit,
-        "bool" => Type::Bool,
-        "u8" => Type::U8,
-        "u16" => Type::U16,
-        "u32" => Type::U32,
-        "u64" => Type::U64,
-        "u128" => Type::U128,
-        "i8" => Type::I8,
-        "i16" => Type::I16,
-        "i32" => Type::I32,
-        "i64" => Type::I64,
-        "i128" => Type::I128,
-        "f32" => Type::F32,
-        "f64" => Type::F64,
-        "char" => Type::Char,
-        "text" => Type::Text,
-        "bytes" => Type::Bytes,
-        _ => return None,
-    })
 }

@@ -17,7 +17,6 @@ mod names;
 mod python;
 mod refusal;
 mod rust;
-mod standard;
 #[cfg(test)]
 mod tests;
 mod texts;

@@ -2,11 +2,10 @@
 //! classes for its types. The module compares its hash with the file's when it is imported.
 
 use super::blueprint::{Blueprint, Body, Inside, Layout, NamedType, Operation, Published, TypedField, Variant};
-use super::names::{Scope, camel, is_plain, last, snake};
-use super::refusal::{Refusal, RefusedFor};
-use super::standard;
-use super::texts::{in_docstring, one_line, python_literal, wrapped};
-use rohrpost::schema::{DataKind, Field, Value};
+use super::names::{Scope, camel, is_plain, last, snake, standard_name};
+use super::refusal::{Refusal, cannot};
+use super::texts::{in_docstring, literal, one_line, python_literal, wrapped};
+use rohrpost::schema::{DataKind, Field, Type};
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
@@ -80,10 +79,6 @@ struct PythonCode<'a> {
     classes: RefCell<Scope>,
 }
 
-fn cannot(place: &str, what: impl Into<String>, instead: &'static str) -> Refusal {
-    RefusedFor::Language { language: "Python", what: what.into(), instead }.at(place)
-}
-
 /// A name that Python can have, near to this one; names that begin with two `_` mean something else inside of a class.
 fn near(name: &str, more: &str, other: &str) -> String {
     let plain = is_plain(name) && !name.starts_with('_');
@@ -98,7 +93,7 @@ impl<'a> PythonCode<'a> {
         let name = scope.give(&camel(blueprint.name, "Interface"), "");
         let (mut names, mut there) = (Vec::new(), Vec::new());
         for named in &blueprint.types {
-            let standard = standard::name(named.ty, named.name).filter(|name| STANDARD.contains(name));
+            let standard = standard_name(named.ty, named.name).filter(|name| STANDARD.contains(name));
             there.push(standard.is_some());
             let own = || scope.give(&camel(last(named.name), "Type"), "");
             names.push(standard.map_or_else(own, |name| format!("rp.{name}")));
@@ -110,15 +105,7 @@ impl<'a> PythonCode<'a> {
     fn ty(&self, layout: &Layout) -> String {
         let inner = |layout: &Layout| self.ty(layout);
         match layout {
-            Layout::Unit => "None".into(),
-            Layout::Bool => "bool".into(),
-            Layout::Whole(true, 64) => "int".into(),
-            Layout::Whole(signed, bits) => format!("rp.{}{bits}", if *signed { 'I' } else { 'U' }),
-            Layout::F32 => "rp.F32".into(),
-            Layout::F64 => "float".into(),
-            Layout::Char => "rp.Char".into(),
-            Layout::Text => "str".into(),
-            Layout::Bytes => "bytes".into(),
+            Layout::Plain(plain) => plain.python.into(),
             Layout::Option(some) if self.is_nullable(some) => format!("Annotated[{}, rp.maybe]", inner(some)),
             Layout::Option(some) => format!("{} | None", inner(some)),
             Layout::List(element) => format!("list[{}]", inner(element)),
@@ -137,7 +124,8 @@ impl<'a> PythonCode<'a> {
     /// Whether `None` is among its values.
     fn is_nullable(&self, layout: &Layout) -> bool {
         match layout {
-            Layout::Unit | Layout::Option(_) => true,
+            Layout::Plain(plain) => plain.ty == Type::Unit,
+            Layout::Option(_) => true,
             Layout::Named(place) => match &self.blueprint.types[*place].body {
                 Body::Struct(Inside::Nothing) => true,
                 Body::Struct(Inside::One(part)) => self.is_nullable(&part.layout),
@@ -191,7 +179,6 @@ impl<'a> PythonCode<'a> {
         format!("tuple[{}]", if all.is_empty() { "()".into() } else { all.join(", ") })
     }
 
-    /// A class with fields.
     fn class(
         &self,
         name: &str,
@@ -201,7 +188,12 @@ impl<'a> PythonCode<'a> {
         known: &str,
     ) -> Result<String, Refusal> {
         if parts.is_empty() {
-            return Err(cannot(name, "named fields of which there are none", "give it a field, or none without names"));
+            return Err(cannot(
+                "Python",
+                name,
+                "named fields of which there are none",
+                "give it a field, or none without names",
+            ));
         }
         let mut code = format!("{}\nclass {own}:\n", decorated(known));
         code += &docstring("    ", text).map_or(String::new(), |text| text + "\n");
@@ -246,7 +238,7 @@ impl<'a> PythonCode<'a> {
             let carried = match &variant.inside {
                 Inside::Nothing => "None".into(),
                 // `None` alone would be a variant that carries nothing.
-                Inside::One(part) if part.layout == Layout::Unit && said(part.field, "").is_empty() => {
+                Inside::One(part) if part.layout.is(&Type::Unit) && said(part.field, "").is_empty() => {
                     "Annotated[None, rp.said()]".into()
                 }
                 Inside::One(part) => self.annotation(part, ""),
@@ -384,14 +376,4 @@ fn said(field: &Field, name: &str) -> String {
     let bounds = bounds.into_iter().filter_map(|(key, bound)| Some(format!("{key}={}", bound?)));
     words.extend(bounds);
     words.join(", ")
-}
-
-/// A bound in Python; those that are no numbers stay away.
-fn literal(value: &Value) -> Option<String> {
-    match value {
-        Value::U(number) => Some(number.to_string()),
-        Value::I(number) => Some(number.to_string()),
-        Value::F(number) if number.is_finite() => Some(format!("{number:?}")),
-        _ => None,
-    }
 }

@@ -2,7 +2,6 @@
 
 use rohrpost::output::plain;
 
-/// Bytes of a name.
 pub(super) const NAME_BYTES_MAX: usize = 200;
 /// Types inside of each other: what compilers of all languages take without being told.
 pub(super) const DEPTH_MAX: usize = 64;
@@ -36,6 +35,11 @@ pub(super) enum RefusedFor {
     PartName(String),
     #[error("{language} cannot have {what}; {instead}")]
     Language { language: &'static str, what: String, instead: &'static str },
+}
+
+/// What a language cannot have at a place, and what to take instead.
+pub(super) fn cannot(language: &'static str, place: &str, what: impl Into<String>, instead: &'static str) -> Refusal {
+    RefusedFor::Language { language, what: what.into(), instead }.at(place)
 }
 
 impl RefusedFor {

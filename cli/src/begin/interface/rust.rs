@@ -2,10 +2,9 @@
 //! themselves again, and a test in the code compares their hash with the file's.
 
 use super::blueprint::{Blueprint, Body, Inside, Layout, NamedType, Operation, Published, TypedField};
-use super::names::{Scope, camel, is_plain, last, snake};
-use super::refusal::{Refusal, RefusedFor};
-use super::standard;
-use super::texts::{in_rust_doc, one_line, wrapped};
+use super::names::{Scope, camel, is_plain, last, snake, standard_name};
+use super::refusal::{Refusal, RefusedFor, cannot};
+use super::texts::{in_rust_doc, literal, one_line, wrapped};
 use rohrpost::schema::{DataKind, Field, Type, Value};
 use std::collections::BTreeSet;
 
@@ -66,16 +65,12 @@ struct RustCode<'a> {
     ordered: Vec<bool>,
 }
 
-fn cannot(place: &str, what: impl Into<String>, instead: &'static str) -> Refusal {
-    RefusedFor::Language { language: "Rust", what: what.into(), instead }.at(place)
-}
-
 /// A name that is in the description, and has no other there.
 fn exact<'n>(name: &'n str, place: &str) -> Result<std::borrow::Cow<'n, str>, Refusal> {
     let word = format!(" {name} ");
     if !is_plain(name) || UNRAW.contains(&word) {
         let instead = "names of functions and arguments are letters, digits and `_`, and no `self`";
-        return Err(cannot(place, format!("the name `{name}`"), instead));
+        return Err(cannot("Rust", place, format!("the name `{name}`"), instead));
     }
     Ok(if KEYWORDS.contains(&word) { format!("r#{name}").into() } else { name.into() })
 }
@@ -97,14 +92,14 @@ impl<'a> RustCode<'a> {
     fn of(blueprint: &'a Blueprint<'a>) -> Result<Self, Refusal> {
         let name = blueprint.name;
         if !is_plain(name) || format!("{KEYWORDS}{UNRAW}").contains(&format!(" {name} ")) {
-            return Err(cannot("", format!("a trait called `{name}`"), "its name is letters and digits"));
+            return Err(cannot("Rust", "", format!("a trait called `{name}`"), "its name is letters and digits"));
         }
         let own = [name.to_owned(), format!("{name}Interface"), format!("{name}Proxy")];
         let taken = PRELUDE.split_whitespace().chain(["Self"]).chain(own.iter().map(String::as_str));
         let mut scope = Scope::with(taken);
         let (mut paths, mut there) = (Vec::new(), Vec::new());
         for named in &blueprint.types {
-            let standard = standard::name(named.ty, named.name);
+            let standard = standard_name(named.ty, named.name);
             there.push(standard.is_some());
             let own = || scope.give(&camel(last(named.name), "Type"), "");
             paths.push(standard.map_or_else(own, |name| format!("rohrpost::types::{name}")));
@@ -120,40 +115,32 @@ impl<'a> RustCode<'a> {
 
     fn is_ordered(&self, layout: &Layout) -> bool {
         match layout {
-            Layout::F32 | Layout::F64 => false,
+            Layout::Plain(plain) => !matches!(plain.ty, Type::F32 | Type::F64),
             Layout::Option(inner) | Layout::List(inner) | Layout::Array(_, inner) => self.is_ordered(inner),
             Layout::Map(a, b) | Layout::Result(a, b) => self.is_ordered(a) && self.is_ordered(b),
             Layout::Tuple(all) => all.iter().all(|one| self.is_ordered(one)),
             Layout::Named(place) => self.ordered[*place],
-            _ => true,
         }
     }
 
     fn ty(&self, layout: &Layout, place: &str) -> Result<String, Refusal> {
         let inner = |layout: &Layout| self.ty(layout, place);
         Ok(match layout {
-            Layout::Unit => "()".into(),
-            Layout::Bool => "bool".into(),
-            Layout::Whole(signed, bits) => format!("{}{bits}", if *signed { 'i' } else { 'u' }),
-            Layout::F32 => "f32".into(),
-            Layout::F64 => "f64".into(),
-            Layout::Char => "char".into(),
-            Layout::Text => "String".into(),
-            Layout::Bytes => "rohrpost::types::Bytes".into(),
+            Layout::Plain(plain) => plain.rust.into(),
             Layout::Option(some) => format!("Option<{}>", inner(some)?),
             Layout::List(element) => format!("Vec<{}>", inner(element)?),
             Layout::Array(length, _) if *length > 32 => {
                 let what = format!("an array of {length} in what travels");
-                return Err(cannot(place, what, "serde has those of at most 32; take a list, or several"));
+                return Err(cannot("Rust", place, what, "serde has those of at most 32; take a list, or several"));
             }
             Layout::Array(length, element) => format!("[{}; {length}]", inner(element)?),
             Layout::Map(key, _) if !self.is_ordered(key) => {
-                return Err(cannot(place, "keys with fractions in a map", "take whole numbers or texts"));
+                return Err(cannot("Rust", place, "keys with fractions in a map", "take whole numbers or texts"));
             }
             Layout::Map(key, value) => format!("std::collections::BTreeMap<{}, {}>", inner(key)?, inner(value)?),
             Layout::Tuple(all) if all.is_empty() || all.len() > 8 => {
                 let what = format!("a tuple of {} in what travels", all.len());
-                return Err(cannot(place, what, "those of 1 to 8 elements are described; take a struct"));
+                return Err(cannot("Rust", place, what, "those of 1 to 8 elements are described; take a struct"));
             }
             Layout::Tuple(all) => {
                 let all: Vec<String> = all.iter().map(inner).collect::<Result<_, _>>()?;
@@ -215,7 +202,7 @@ impl<'a> RustCode<'a> {
             Inside::Nothing => String::new(),
             Inside::One(part) => format!("({})", unnamed(part)?),
             Inside::Tuple(parts) if parts.len() == 1 => {
-                return Err(cannot(place, "several parts that are one", "one part is the thing itself"));
+                return Err(cannot("Rust", place, "several parts that are one", "one part is the thing itself"));
             }
             Inside::Tuple(parts) => {
                 format!("({})", parts.iter().map(unnamed).collect::<Result<Vec<_>, Refusal>>()?.join(", "))
@@ -255,7 +242,7 @@ impl<'a> RustCode<'a> {
             let name = &published.part.field.name;
             if !constants.insert(name.to_uppercase()) {
                 let what = format!("two constants called {}", name.to_uppercase());
-                return Err(cannot(name, what, "give data names that differ in more than capitals"));
+                return Err(cannot("Rust", name, what, "give data names that differ in more than capitals"));
             }
             code += if at == 0 && operations.is_empty() { "" } else { "\n" };
             code += &self.published(published)?;
@@ -267,7 +254,7 @@ impl<'a> RustCode<'a> {
         let (function, name) = (operation.function, operation.function.name.as_str());
         self.free(name)?;
         if operation.arguments.len() > 8 {
-            return Err(cannot(name, "more than eight arguments", "put them into a struct"));
+            return Err(cannot("Rust", name, "more than eight arguments", "put them into a struct"));
         }
         let mut code = wrapped("    /// ", &in_rust_doc(&function.text));
         let idempotent = if function.idempotent { ", idempotent" } else { "" };
@@ -282,7 +269,7 @@ impl<'a> RustCode<'a> {
             long += &format!("        {}{argument},\n", said.map_or(String::new(), |said| format!("{said} ")));
         }
         let result = match &operation.result {
-            Layout::Unit => String::new(),
+            layout if layout.is(&Type::Unit) => String::new(),
             result => format!(" -> {}", self.ty(result, name)?),
         };
         let fn_name = exact(name, name)?;
@@ -297,7 +284,7 @@ impl<'a> RustCode<'a> {
         let begins = |other: &Operation<'_>| name.strip_prefix("begin_") == Some(&other.function.name);
         if ["new", "with_timeout"].contains(&name) || self.blueprint.operations.iter().any(begins) {
             let what = format!("`{name}`: each proxy has a function of this name");
-            return Err(cannot(name, what, "give it another name where the interface is written"));
+            return Err(cannot("Rust", name, what, "give it another name where the interface is written"));
         }
         Ok(())
     }
@@ -342,12 +329,6 @@ fn bounds(field: &Field) -> Option<(Option<String>, Option<String>)> {
     if (least.is_none(), most.is_none()) != (field.least.is_none(), field.most.is_none()) {
         return None;
     }
-    let literal = |value: &Value| match value {
-        Value::U(number) => Some(number.to_string()),
-        Value::I(number) => Some(number.to_string()),
-        Value::F(number) if number.is_finite() => Some(format!("{number:?}")),
-        _ => None,
-    };
     let is_above = match (&least, &most) {
         (Some(Value::U(least)), Some(Value::U(most))) => least > most,
         (Some(Value::I(least)), Some(Value::I(most))) => least > most,

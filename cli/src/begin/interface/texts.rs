@@ -2,7 +2,7 @@
 //! direction in which the code is read.
 
 use rohrpost::output::plain::is_obeyed;
-use rohrpost::schema::Field;
+use rohrpost::schema::{Field, Value};
 
 /// Columns of a line of comment, with its indentation.
 const COLUMNS: usize = 100;
@@ -45,6 +45,16 @@ pub(super) fn wrapped(prefix: &str, text: &str) -> String {
         lines += &format!("{prefix}{line}\n");
     }
     lines
+}
+
+/// A bound in Rust and Python; those that are no numbers stay away.
+pub(super) fn literal(value: &Value) -> Option<String> {
+    match value {
+        Value::U(number) => Some(number.to_string()),
+        Value::I(number) => Some(number.to_string()),
+        Value::F(number) if number.is_finite() => Some(format!("{number:?}")),
+        _ => None,
+    }
 }
 
 /// A literal of Python: escapes of JSON, which Python reads alike but for halves of pairs.

@@ -10,7 +10,6 @@ const KEYWORDS: &str = "abstract as async await become box break const continue 
 /// Crates that every project uses, our own crates, and folders that Cargo creates beside programs.
 const CRATES: &str = "alloc build core deps examples incremental module proc-macro rohrpost std test tests";
 
-/// A valid name.
 #[derive(Debug)]
 pub(super) struct ModuleName(String);
 

@@ -1,6 +1,6 @@
 //! The kernel and the processor: what may delay a thread.
 
-use super::finding::{Finding, Grade};
+use super::finding::{Check, Finding};
 use super::machine::Machine;
 use crate::daemons::{self, Daemon};
 
@@ -21,15 +21,15 @@ pub(super) fn findings(machine: &Machine) -> Vec<Finding> {
 /// If nodes have a common time, no other program may slew their clocks.
 fn time_daemons(machine: &Machine) -> Vec<Finding> {
     let finding = |daemon: Daemon| {
-        let (what, is) = ("time daemon", format!("{} runs", daemon.name));
+        let is = format!("{} runs", daemon.name);
         match machine.asked.lan {
-            Some(_) => Finding::not(Grade::Warn, what, is, daemons::WHY, daemon.ends),
-            None => Finding::ok(what, is, "it does no harm, unless nodes follow a master clock"),
+            Some(_) => Check("time daemon", daemons::WHY).warn(is, daemon.ends),
+            None => Check("time daemon", "it does no harm, unless nodes follow a master clock").ok(is),
         }
     };
     let running = daemons::running(&machine.folder("/proc"));
     if running.is_empty() {
-        return vec![Finding::ok("time daemon", "none runs", daemons::WHY)];
+        return vec![Check("time daemon", daemons::WHY).ok("none runs")];
     }
     running.into_iter().map(finding).collect()
 }
@@ -40,9 +40,9 @@ fn version(machine: &Machine) -> Option<Finding> {
     let mut parts = text.split(|c: char| !c.is_ascii_digit()).map(|part| part.parse().unwrap_or(0));
     let version = (parts.next()?, parts.next().unwrap_or(0));
     Some(if version >= KERNEL_LEAST {
-        Finding::ok("kernel", text, why)
+        Check("kernel", why).ok(text)
     } else {
-        Finding::not(Grade::Bad, "kernel", text, why, "install a newer kernel")
+        Check("kernel", why).bad(text, "install a newer kernel")
     })
 }
 
@@ -50,7 +50,7 @@ fn preemption(machine: &Machine) -> Option<Finding> {
     let why = "bounds how long the kernel itself delays an urgent thread";
     let built = machine.read("/proc/version")?;
     if machine.number("/sys/kernel/realtime") == Some(1) || built.contains("PREEMPT_RT") {
-        return Some(Finding::ok("preemption", "PREEMPT_RT", why));
+        return Some(Check("preemption", why).ok("PREEMPT_RT"));
     }
     // `none voluntary (full) lazy`: the mode in brackets is active. Mostly only root may read the file.
     let chosen = machine.read("/sys/kernel/debug/sched/preempt");
@@ -61,25 +61,21 @@ fn preemption(machine: &Machine) -> Option<Finding> {
         None if built.contains("PREEMPT") => "full".into(),
         None => "none or voluntary".into(),
     };
-    Some(Finding::not(
-        Grade::Warn,
-        "preemption",
+    Some(Check("preemption", why).warn(
         format!("{model}; not PREEMPT_RT"),
-        why,
         "boot a kernel with PREEMPT_RT (Debian: `apt install linux-image-rt-amd64`), or at least with `preempt=full`",
     ))
 }
 
 fn throttling(machine: &Machine) -> Option<Finding> {
-    let why = "a SCHED_FIFO thread that never sleeps must leave some time to other threads";
-    let (path, what) = ("/proc/sys/kernel/sched_rt_runtime_us", "real-time share");
-    let runtime: i64 = machine.read(path)?.parse().ok()?;
+    let check = Check("real-time share", "a SCHED_FIFO thread that never sleeps must leave some time to other threads");
+    let runtime: i64 = machine.read("/proc/sys/kernel/sched_rt_runtime_us")?.parse().ok()?;
     let period = machine.number("/proc/sys/kernel/sched_rt_period_us").unwrap_or(1_000_000).max(1);
     let fix = "sudo sysctl -w kernel.sched_rt_runtime_us=950000";
     Some(match runtime {
-        0 => Finding::not(Grade::Bad, what, "0 µs: SCHED_FIFO threads never run", why, fix),
-        ..0 => Finding::not(Grade::Warn, what, "no limit: an endless loop blocks the computer", why, fix),
-        _ => Finding::ok(what, format!("{runtime} of {period} µs"), why),
+        0 => check.bad("0 µs: SCHED_FIFO threads never run", fix),
+        ..0 => check.warn("no limit: an endless loop blocks the computer", fix),
+        _ => check.ok(format!("{runtime} of {period} µs")),
     })
 }
 
@@ -89,20 +85,17 @@ fn fair_server(machine: &Machine) -> Option<Finding> {
     let period = machine.number("/sys/kernel/debug/sched/fair_server/cpu0/period")?;
     let is = format!("{} of {} ms go to ordinary threads if they starve", runtime / 1_000_000, period / 1_000_000);
     let why = "a real-time thread may be delayed this long when others starve";
-    Some(Finding::ok("fair server", is, why))
+    Some(Check("fair server", why).ok(is))
 }
 
 fn clock_source(machine: &Machine) -> Option<Finding> {
     let folder = "/sys/devices/system/clocksource/clocksource0";
-    let (what, why) = (
-        "clock source",
-        "every package and deadline reads the clock; some clock sources need a system \
-        call",
-    );
+    let check =
+        Check("clock source", "every package and deadline reads the clock; some clock sources need a system call");
     let source = machine.read(&format!("{folder}/current_clocksource"))?;
     let slow = ["hpet", "acpi_pm", "jiffies", "refined-jiffies", "pit"];
     if !slow.contains(&source.as_str()) {
-        return Some(Finding::ok(what, source, why));
+        return Some(check.ok(source));
     }
     let available = machine.read(&format!("{folder}/available_clocksource")).unwrap_or_default();
     let better = available.split_whitespace().find(|source| !slow.contains(source));
@@ -110,28 +103,28 @@ fn clock_source(machine: &Machine) -> Option<Finding> {
         Some(better) => format!("echo {better} | sudo tee {folder}/current_clocksource"),
         None => "find out why the kernel rejected the better one: `dmesg | grep -i clocksource`".into(),
     };
-    Some(Finding::not(Grade::Warn, what, format!("{source} (slow)"), why, fix))
+    Some(check.warn(format!("{source} (slow)"), fix))
 }
 
 fn governor(machine: &Machine) -> Finding {
-    let (what, why) = ("CPU governor", "a core that must first speed up is late by tens of microseconds");
+    let check = Check("CPU governor", "a core that must first speed up is late by tens of microseconds");
     let cpus = machine.numbered(CPUS, "cpu").into_iter();
     let mut governors: Vec<String> =
         cpus.filter_map(|cpu| machine.read(&format!("{CPUS}/{cpu}/cpufreq/scaling_governor"))).collect();
     governors.sort();
     governors.dedup();
     match &governors[..] {
-        [] => Finding::ok(what, "none: firmware or the host sets the clock rate", why),
-        [only] if only == "performance" => Finding::ok(what, "performance", why),
+        [] => check.ok("none: firmware or the host sets the clock rate"),
+        [only] if only == "performance" => check.ok("performance"),
         several => {
             let fix = "sudo cpupower frequency-set -g performance";
-            Finding::not(Grade::Warn, what, several.join(", "), why, fix)
+            check.warn(several.join(", "), fix)
         }
     }
 }
 
 fn idle(machine: &Machine) -> Finding {
-    let (what, why) = ("idle states", "a core in a deep idle state takes this long to wake up");
+    let check = Check("idle states", "a core in a deep idle state takes this long to wake up");
     let folder = format!("{CPUS}/cpu0/cpuidle");
     let states = machine.numbered(&folder, "state").into_iter().filter_map(|state| {
         let of = |file| machine.read(&format!("{folder}/{state}/{file}"));
@@ -139,19 +132,17 @@ fn idle(machine: &Machine) -> Finding {
         Some((of("latency")?.parse::<u64>().ok()?, of("name")?)).filter(|_| used)
     });
     match states.max() {
-        None => Finding::ok(what, "none, or controlled by the host", why),
-        Some((latency, name)) if latency <= IDLE_LATENCY_US => {
-            Finding::ok(what, format!("deepest is {name}, {latency} µs"), why)
-        }
+        None => check.ok("none, or controlled by the host"),
+        Some((latency, name)) if latency <= IDLE_LATENCY_US => check.ok(format!("deepest is {name}, {latency} µs")),
         Some((latency, name)) => {
             let fix = format!("sudo cpupower idle-set -D {IDLE_LATENCY_US}");
-            Finding::not(Grade::Warn, what, format!("deepest is {name}, {latency} µs"), why, fix)
+            check.warn(format!("deepest is {name}, {latency} µs"), fix)
         }
     }
 }
 
 fn cores(machine: &Machine) -> Finding {
-    let (what, why) = ("cores", "with one core, a busy module delays all less urgent ones");
+    let check = Check("cores", "with one core, a busy module delays all less urgent ones");
     let allowed = machine.field("/proc/self/status", "Cpus_allowed_list");
     let count = allowed.as_deref().map_or(0, count_of_list);
     let is = match (count, allowed) {
@@ -161,9 +152,9 @@ fn cores(machine: &Machine) -> Finding {
     };
     if count == 1 {
         let fix = "give it more cores, or lift the restriction (`taskset -pc $$`, cpuset of the container)";
-        return Finding::not(Grade::Warn, what, is, why, fix);
+        return check.warn(is, fix);
     }
-    Finding::ok(what, is, why)
+    check.ok(is)
 }
 
 /// Counts the processors of a list: `0-3,8` is five.
@@ -182,9 +173,9 @@ fn isolated(machine: &Machine) -> Finding {
     } else {
         format!("numbers {list}; start there with `taskset -c {list} rohrpost launch …`")
     };
-    Finding::ok(
+    Check(
         "isolated cores",
-        is,
         "the kernel schedules no other threads there (boot with `isolcpus=`); useful only for the last microseconds",
     )
+    .ok(is)
 }

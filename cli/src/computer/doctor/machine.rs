@@ -1,7 +1,7 @@
 //! What is read of a computer: files below a root directory, and the few facts that no file holds.
 
-use super::lan::LanView;
-use super::protection::Protection;
+use super::network::LanView;
+use super::security::Protection;
 use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
 use rohrpost_mailbox::sys::{self, Room};
 use rohrpost_mailbox::{Node, NodeError, SystemClock, base_directory, monotonic_ns, realtime_ns, saturating_sum};
@@ -15,11 +15,9 @@ pub(super) struct Needs {
     pub(super) priority: u8,
     /// Bytes of mailboxes and of the streams that the configuration names.
     pub(super) memory: u64,
-    /// Whether a GUI runs.
     pub(super) gui: bool,
     /// The viewer's bridge, if the configuration has it.
     pub(super) bridge: Option<PathBuf>,
-    /// Number of processes.
     pub(super) processes: usize,
     /// The configuration's file.
     pub(super) from: Option<PathBuf>,
@@ -92,7 +90,6 @@ pub(super) struct Bridge {
     pub(super) pid: Option<u32>,
 }
 
-/// A node's directory.
 pub(super) struct NodeFound {
     pub(super) path: PathBuf,
     pub(super) seen: NodeDirectory,
@@ -101,7 +98,6 @@ pub(super) struct NodeFound {
     pub(super) clock_set_by_ns: Option<i64>,
 }
 
-/// The streams in a node's directory.
 #[derive(Default)]
 pub(super) struct StreamsFound {
     pub(super) number: usize,
@@ -109,7 +105,6 @@ pub(super) struct StreamsFound {
     pub(super) bytes: u64,
 }
 
-/// What is in a node's directory.
 pub(super) enum NodeDirectory {
     /// A launch with this process id runs it.
     Launched(u32),
@@ -156,7 +151,6 @@ impl Machine {
         Some(text.trim().to_owned())
     }
 
-    /// The path of one of its folders.
     pub(super) fn folder(&self, path: &str) -> PathBuf {
         self.root.join(path.trim_start_matches('/'))
     }
@@ -200,7 +194,6 @@ pub(crate) fn room_of_nodes(base: &Path) -> Option<Room> {
     sys::room(there).ok()
 }
 
-/// A limit of the kernel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Limit {
     None,

@@ -1,6 +1,6 @@
 //! How late a thread wakes up: for one second it sleeps until each full millisecond.
 
-use super::finding::{Finding, Grade};
+use super::finding::{Check, Finding};
 use crate::terminal::table::time;
 use rohrpost_mailbox::sys::{self, Scheduling};
 use std::time::{Duration, Instant};
@@ -10,14 +10,13 @@ const WAKES: u32 = 1000;
 /// More than this is late for a robot that drives.
 const LATE: Duration = Duration::from_millis(5);
 
-const WHAT: &str = "wake-up";
-const WHY: &str = "a module that sleeps until a time wakes up this late, under the present load";
+const CHECK: Check = Check("wake-up", "a module that sleeps until a time wakes up this late, under the present load");
 
 /// Measures with the scheduling that the most urgent module would get.
 pub(super) fn wake_up(priority: u8) -> Finding {
     match std::thread::spawn(move || measure(priority)).join() {
         Ok((latenesses, fifo)) => validate(&latenesses, fifo.then_some(priority)),
-        Err(_) => Finding::not(Grade::Warn, WHAT, "the measuring thread has panicked", WHY, "try again"),
+        Err(_) => CHECK.warn("the measuring thread has panicked", "try again"),
     }
 }
 
@@ -29,9 +28,9 @@ pub(super) fn validate(latenesses: &[Duration], fifo: Option<u8>) -> Finding {
     let is = format!("half by {}, 99 % by {}, all by {} late, of {wakes} under {how}", at(0.5), at(0.99), at(1.0));
     if latenesses.last().is_some_and(|most| *most > LATE) {
         let fix = "fix the warnings above; then look for other busy threads (`top -H`)";
-        return Finding::not(Grade::Warn, WHAT, is, WHY, fix);
+        return CHECK.warn(is, fix);
     }
-    Finding::ok(WHAT, is, WHY)
+    CHECK.ok(is)
 }
 
 /// Sorted latenesses, and whether the thread was real time.

@@ -2,12 +2,10 @@
 
 mod finding;
 mod kernel;
-mod lan;
 mod machine;
 mod measure;
 mod network;
 mod place;
-mod protection;
 mod rights;
 mod security;
 
@@ -15,8 +13,8 @@ use crate::terminal::{Failure, say, say_folded};
 use finding::{Finding, Grade};
 pub(crate) use machine::room_of_nodes;
 use machine::{Machine, Needs};
-use protection::Protection;
 use rohrpost_launch::choose_node;
+use security::Protection;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -90,10 +88,7 @@ fn page(findings: &[Finding]) -> String {
 
 fn json(findings: &[Finding]) -> serde_json::Value {
     let worst = findings.iter().map(|finding| finding.state).max().unwrap_or(Grade::Ok);
-    let findings = findings.iter().map(|Finding { what, state, is, why, fix }| {
-        serde_json::json!({ "what": what, "state": state.name(), "is": is, "why": why, "fix": fix })
-    });
-    serde_json::json!({ "state": worst.name(), "findings": findings.collect::<Vec<_>>() })
+    serde_json::json!({ "state": worst, "findings": findings })
 }
 
 #[cfg(test)]

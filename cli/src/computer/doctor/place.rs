@@ -1,6 +1,6 @@
 //! The directory where a node would be created, its limits, and what exists there already.
 
-use super::finding::{Finding, Grade};
+use super::finding::{Check, Finding};
 use super::machine::{Bridge, Machine, Needs, NodeDirectory, StreamsFound};
 use crate::terminal::units::{date, size};
 use rohrpost_modules::runtime::clock_was_set;
@@ -58,27 +58,27 @@ impl Mount {
 }
 
 fn file_system(machine: &Machine) -> Option<Finding> {
-    let (what, why) = (
+    let check = Check(
         "node directory",
         "mailboxes and streams are files there; on any other file system the kernel writes them to a disk",
     );
     let mount = mount(machine)?;
     let is = format!("{} ({})", machine.asked.base.display(), mount.kind);
     if mount.is_memory() {
-        return Some(Finding::ok(what, is, why));
+        return Some(check.ok(is));
     }
-    Some(Finding::not(Grade::Warn, what, is, why, "unset ROHRPOST_DIR, or set it to a folder below /dev/shm"))
+    Some(check.warn(is, "unset ROHRPOST_DIR, or set it to a folder below /dev/shm"))
 }
 
 fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
-    let (what, why) = ("shared memory", "mailboxes and streams take all of their memory when they are made");
+    let check = Check("shared memory", "mailboxes and streams take all of their memory when they are made");
     let mount = mount(machine);
     let Some(room) = machine.asked.room else {
         let fix = match &mount {
             Some(mount) if mount.is_memory() => format!("df {}", mount.quoted()),
             _ => "mount -t tmpfs tmpfs /dev/shm".to_owned(),
         };
-        return Some(Finding::not(Grade::Warn, what, "its size is unknown", why, fix));
+        return Some(check.warn("its size is unknown", fix));
     };
     let needed = match &needs.from {
         Some(file) => format!("; {} needs {} for its mailboxes and streams", file.display(), size(needs.memory)),
@@ -90,9 +90,9 @@ fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
         format!("rohrpost clean; {}", more_room(mount.as_ref(), wanted))
     };
     Some(match room.free {
-        free if free < needs.memory.max(LEAST) => Finding::not(Grade::Bad, what, is, why, fix()),
-        free if free < needs.memory + SPARE => Finding::not(Grade::Warn, what, is, why, fix()),
-        _ => Finding::ok(what, is, why),
+        free if free < needs.memory.max(LEAST) => check.bad(is, fix()),
+        free if free < needs.memory + SPARE => check.warn(is, fix()),
+        _ => check.ok(is),
     })
 }
 
@@ -114,7 +114,7 @@ fn container(machine: &Machine) -> Option<Finding> {
         ("/run/systemd/container", "systemd-nspawn or LXC"),
     ];
     let kind = marks.iter().find(|(mark, _)| machine.exists(mark)).map(|(_, kind)| *kind);
-    Some(Finding::ok("container", kind.unwrap_or("none known"), why))
+    Some(Check("container", why).ok(kind.unwrap_or("none known")))
 }
 
 /// Limits of this process's control group and of its ancestors.
@@ -133,7 +133,7 @@ fn share_of_time(machine: &Machine) -> Option<Finding> {
         Some(quota.parse::<f64>().ok()? / period.parse::<f64>().ok()?)
     })?;
     let fix = format!("echo max | sudo tee {path}, or start the container without `--cpus`");
-    Some(Finding::not(Grade::Warn, "CPU quota", format!("{value} cores ({path})"), why, fix))
+    Some(Check("CPU quota", why).warn(format!("{value} cores ({path})"), fix))
 }
 
 /// Version 1 of control groups gives real-time threads no time by default.
@@ -142,32 +142,32 @@ fn share_of_real_time(machine: &Machine) -> Option<Finding> {
     let (_, path) = least.filter(|(value, _)| *value <= 0.0)?;
     let fix = format!("echo 950000 | sudo tee {path}, in the groups around it first");
     let why = "without this share, the group may not use SCHED_FIFO";
-    Some(Finding::not(Grade::Warn, "real-time quota", format!("0 µs ({path})"), why, fix))
+    Some(Check("real-time quota", why).warn(format!("0 µs ({path})"), fix))
 }
 
 fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding> {
-    let (what, why) = ("memory limit", "a process beyond it is killed; shared memory counts");
+    let check = Check("memory limit", "a process beyond it is killed; shared memory counts");
     let (limit, path) = tightest(machine, "memory", file, whole)?;
     let (limit, is) = (limit as u64, format!("{} ({path})", size(limit as u64)));
     if limit >= needs.memory + SPARE {
-        return Some(Finding::ok(what, is, why));
+        return Some(check.ok(is));
     }
     let fix = "start the container with more `--memory`, or MemoryMax= in the unit";
-    Some(Finding::not(Grade::Bad, what, is, why, fix))
+    Some(check.bad(is, fix))
 }
 
 fn process_limit(machine: &Machine, needs: &Needs) -> Option<Finding> {
-    let (what, why) = ("processes", "each module is a process of a few threads");
+    let check = Check("processes", "each module is a process of a few threads");
     let (limit, path) = tightest(machine, "pids", "pids.max", whole)?;
     let (limit, wanted) = (limit as u64, needs.processes as u64 * THREADS);
     let used = machine.number(&path.replace("pids.max", "pids.current")).unwrap_or(0);
     let is = format!("{limit}, {used} in use ({path})");
     if limit >= used + wanted {
-        return Some(Finding::ok(what, is, why));
+        return Some(check.ok(is));
     }
     let more = used + 10 * wanted;
     let fix = format!("echo {more} | sudo tee {path}, or `--pids-limit` of the container, TasksMax= of the unit");
-    Some(Finding::not(Grade::Bad, what, is, why, fix))
+    Some(check.bad(is, fix))
 }
 
 /// A limit in bytes or processes. A huge limit counts as none (version 1 writes "none" as the largest number of pages).
@@ -205,35 +205,26 @@ fn tightest(
 }
 
 fn nodes(machine: &Machine) -> Vec<Finding> {
-    let why = "a node of this user, launched by this computer or left by a crash";
+    let check = Check("node", "a node of this user, launched by this computer or left by a crash");
     let finding = |node: &super::machine::NodeFound| {
-        let (what, path) = ("node", node.path.display());
+        let path = node.path.display();
         let streams = streams(&node.streams);
         match &node.seen {
-            NodeDirectory::Launched(pid) => {
-                Finding::ok(what, format!("{path}: launched by process {pid}{streams}"), why)
-            }
-            NodeDirectory::InUse => Finding::ok(what, format!("{path}: in use, without a launch{streams}"), why),
-            NodeDirectory::Dead => {
-                Finding::not(Grade::Warn, what, format!("{path}: no process uses it{streams}"), why, "rohrpost clean")
-            }
-            NodeDirectory::OtherVersion(version) => Finding::not(
-                Grade::Warn,
-                what,
+            NodeDirectory::Launched(pid) => check.ok(format!("{path}: launched by process {pid}{streams}")),
+            NodeDirectory::InUse => check.ok(format!("{path}: in use, without a launch{streams}")),
+            NodeDirectory::Dead => check.warn(format!("{path}: no process uses it{streams}"), "rohrpost clean"),
+            NodeDirectory::OtherVersion(version) => check.warn(
                 format!(
                     "{path}: made by another version (layout {version}, this program {})",
                     rohrpost_mailbox::LAYOUT_VERSION
                 ),
-                why,
                 format!("stop the node (with the program that launched it), then rm -r {path}"),
             ),
             NodeDirectory::Foreign(error) => {
-                let why = "programs leave it alone, and a node of this name cannot be launched";
-                Finding::not(Grade::Warn, what, error.clone(), why, format!("sudo rm -r {path}"))
+                Check("node", "programs leave it alone, and a node of this name cannot be launched")
+                    .warn(error.clone(), format!("sudo rm -r {path}"))
             }
-            NodeDirectory::Unreadable(error) => {
-                Finding::not(Grade::Warn, what, error.clone(), why, format!("rm -r {path}, if nothing uses it"))
-            }
+            NodeDirectory::Unreadable(error) => check.warn(error.clone(), format!("rm -r {path}, if nothing uses it")),
         }
     };
     machine.asked.nodes.iter().map(finding).collect()
@@ -241,23 +232,19 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
 
 /// The computer's clock, and each node with another time.
 fn clocks(machine: &Machine) -> Vec<Finding> {
-    let what = "clock";
-    let why = "system time begins with it; certificates are checked by it";
+    let check = Check("clock", "system time begins with it; certificates are checked by it");
     let set = date(machine.asked.wall_ns);
     let own = match machine.asked.wall_ns {
-        0..NEVER_SET_NS => Finding::not(
-            Grade::Warn,
-            what,
+        0..NEVER_SET_NS => check.warn(
             format!("{set}: it was not set since the computer was switched on"),
-            why,
             "set it before launch: sudo date -s TIME, or sudo systemctl enable systemd-time-wait-sync (see boot.md)",
         ),
-        _ => Finding::ok(what, set, why),
+        _ => check.ok(set),
     };
     let why = "stamps, streams and recordings of the node go on in its system time";
     let apart = machine.asked.nodes.iter().filter_map(|node| {
         let is = format!("{}: {}", node.path.display(), clock_was_set(node.clock_set_by_ns?));
-        Some(Finding::not(Grade::Warn, "system time", is, why, "rohrpost time --new-epoch"))
+        Some(Check("system time", why).warn(is, "rohrpost time --new-epoch"))
     });
     std::iter::once(own).chain(apart).collect()
 }
@@ -273,25 +260,25 @@ fn streams(found: &StreamsFound) -> String {
 
 fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     // Without a GUI the bridge is not needed.
-    let missing = |what, why, fix: &str| match &needs.from {
-        Some(file) if !needs.gui => Finding::ok(what, format!("not found; {} has no GUI", file.display()), why),
-        _ => Finding::not(Grade::Warn, what, "not found", why, fix),
+    let missing = |check: Check, fix: &str| match &needs.from {
+        Some(file) if !needs.gui => check.ok(format!("not found; {} has no GUI", file.display())),
+        _ => check.warn("not found", fix),
     };
-    let (what, why) = ("GUI bridge", "draws the modules' data; the demo's module `gui.0` uses it");
+    let check = Check("GUI bridge", "draws the modules' data; the demo's module `gui.0` uses it");
     let bridge = match &machine.asked.bridge {
-        Some(Bridge { path, pid: Some(pid) }) => Finding::ok(what, format!("{}, process {pid}", path.display()), why),
-        Some(Bridge { path, pid: None }) => Finding::ok(what, path.display().to_string(), why),
-        None => missing(what, why, "cargo build -p rohrpost-gui-bridge, then PATH=target/debug:$PATH"),
+        Some(Bridge { path, pid: Some(pid) }) => check.ok(format!("{}, process {pid}", path.display())),
+        Some(Bridge { path, pid: None }) => check.ok(path.display().to_string()),
+        None => missing(check, "cargo build -p rohrpost-gui-bridge, then PATH=target/debug:$PATH"),
     };
-    let (what, why) = ("viewer", "shows drawings, live or from a file");
+    let check = Check("viewer", "shows drawings, live or from a file");
     let viewer = match &machine.asked.viewer {
-        Some(path) => Finding::ok(what, path.display().to_string(), why),
-        None => missing(what, why, "pip install rerun-sdk==0.36.3"),
+        Some(path) => check.ok(path.display().to_string()),
+        None => missing(check, "pip install rerun-sdk==0.36.3"),
     };
     vec![bridge, viewer]
 }
 
 fn systemd(machine: &Machine) -> Finding {
     let is = if machine.exists("/run/systemd/system") { "runs" } else { "does not run here" };
-    Finding::ok("systemd", is, "can start a node at boot, and restart it")
+    Check("systemd", "can start a node at boot, and restart it").ok(is)
 }

@@ -1,6 +1,6 @@
 //! The rights of this user and this process.
 
-use super::finding::{Finding, Grade};
+use super::finding::{Check, Finding};
 use super::machine::{Limit, Machine, Needs};
 use crate::terminal::units::size;
 use rohrpost_config::FIFO_MAX;
@@ -16,13 +16,13 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 }
 
 fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
-    let (what, why) = (
+    let check = Check(
         "real time",
         "without the right, modules of classes from 128 up run under the normal scheduler, and other threads delay \
          them",
     );
     let wanted = match (&needs.from, needs.priority) {
-        (Some(file), 0) => return Some(Finding::ok(what, format!("{} asks for none", file.display()), why)),
+        (Some(file), 0) => return Some(check.ok(format!("{} asks for none", file.display()))),
         (Some(file), priority) => format!("{} asks for SCHED_FIFO {priority}", file.display()),
         (None, priority) => format!("modules may ask for up to SCHED_FIFO {priority}"),
     };
@@ -35,13 +35,13 @@ fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
         Limit::Of(limit) => format!("rtprio limit {limit}"),
     };
     match &machine.asked.fifo {
-        Ok(()) => Some(Finding::ok(what, format!("granted ({right}); {wanted}"), why)),
+        Ok(()) => Some(check.ok(format!("granted ({right}); {wanted}"))),
         Err(error) => {
             let fix = format!(
                 "echo \"$USER - rtprio {FIFO_MAX}\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in \
                  anew; in a container: `--ulimit rtprio={FIFO_MAX} --cap-add=SYS_NICE`"
             );
-            Some(Finding::not(Grade::Warn, what, format!("refused ({right}): {error}; {wanted}"), why, fix))
+            Some(check.warn(format!("refused ({right}): {error}; {wanted}"), fix))
         }
     }
 }
@@ -53,49 +53,49 @@ fn nice(machine: &Machine) -> Option<Finding> {
         Limit::Of(limit) => format!("from -{} on", limit.min(40) - 20),
         Limit::None => "from -20 on".into(),
     };
-    Some(Finding::ok("nice", is, "classes below 128 run with nice 0 to 19, which need no right"))
+    Some(Check("nice", "classes below 128 run with nice 0 to 19, which need no right").ok(is))
 }
 
 fn memory_lock(machine: &Machine) -> Option<Finding> {
-    let (what, why) = (
+    let check = Check(
         "locked memory",
         "real-time modules lock their memory only if the limit allows all of it; else page faults delay them",
     );
     Some(match machine.limit("Max locked memory")? {
-        Limit::None => Finding::ok(what, "no limit", why),
+        Limit::None => check.ok("no limit"),
         Limit::Of(bytes) => {
             let fix = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log \
                 in anew; in a container: `--ulimit memlock=-1`";
-            Finding::not(Grade::Warn, what, format!("at most {}", size(bytes)), why, fix)
+            check.warn(format!("at most {}", size(bytes)), fix)
         }
     })
 }
 
 fn swap(machine: &Machine) -> Option<Finding> {
-    let (what, why) = ("swap", "swapped-out memory takes milliseconds to come back");
+    let check = Check("swap", "swapped-out memory takes milliseconds to come back");
     let text = machine.read("/proc/swaps")?;
     let areas: Vec<&str> = text.lines().skip(1).filter_map(|line| line.split_whitespace().next()).collect();
     if areas.is_empty() {
-        return Some(Finding::ok(what, "none", why));
+        return Some(check.ok("none"));
     }
     let is = areas.join(", ");
     // Locked memory is not paged out.
     if machine.limit("Max locked memory") == Some(Limit::None) {
-        return Some(Finding::ok(what, format!("{is}; real-time modules lock their memory"), why));
+        return Some(check.ok(format!("{is}; real-time modules lock their memory")));
     }
-    Some(Finding::not(Grade::Warn, what, is, why, "sudo swapoff -a, or lift the limit of locked memory"))
+    Some(check.warn(is, "sudo swapoff -a, or lift the limit of locked memory"))
 }
 
 fn files(machine: &Machine) -> Option<Finding> {
-    let (what, why) = ("open files", "a process opens each mailbox that it owns or sends to");
+    let check = Check("open files", "a process opens each mailbox that it owns or sends to");
     Some(match machine.limit("Max open files")? {
         Limit::Of(limit) if limit < FILES_LEAST => {
             let fix =
                 format!("ulimit -n {FILES_LEAST}, or a line `$USER - nofile {FILES_LEAST}` in /etc/security/limits.d");
-            Finding::not(Grade::Warn, what, format!("at most {limit}"), why, fix)
+            check.warn(format!("at most {limit}"), fix)
         }
-        Limit::Of(limit) => Finding::ok(what, format!("at most {limit}"), why),
-        Limit::None => Finding::ok(what, "no limit", why),
+        Limit::Of(limit) => check.ok(format!("at most {limit}")),
+        Limit::None => check.ok("no limit"),
     })
 }
 
@@ -111,9 +111,6 @@ fn groups(machine: &Machine) -> Finding {
     };
     let names: Vec<String> = ids.split_whitespace().map(name).collect();
     let names = if names.is_empty() { "no further groups".into() } else { format!("groups {}", names.join(", ")) };
-    Finding::ok(
-        "user",
-        format!("{uid}, {names}"),
-        "devices, and the right to real time, are often given to groups such as dialout or realtime",
-    )
+    Check("user", "devices, and the right to real time, are often given to groups such as dialout or realtime")
+        .ok(format!("{uid}, {names}"))
 }

@@ -1,7 +1,6 @@
 //! `rohrpost graph`: senders, receivers, content and rates of packages, read from the senders' counters; and readers of
 //! streams.
 
-mod dot;
 mod parts;
 mod svg;
 
@@ -13,7 +12,7 @@ use crate::terminal::table::table;
 use crate::terminal::units::{Stop, bytes, seconds};
 use crate::terminal::whole_file::write_whole;
 use crate::terminal::{Failure, say};
-use parts::{Carries, Edge, Graph, Module};
+use parts::{Carries, Edge, Graph, Module, to_dot};
 use rohrpost::Name;
 use rohrpost_launch::survey::{Scope, StreamSurvey, Survey, is_hop};
 use rohrpost_mailbox::{FlowInfo, Kind, StreamId};
@@ -65,11 +64,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let text = if arguments.json {
         serde_json::to_string(&graph)?
     } else if arguments.dot {
-        dot::write(&graph, arguments.all)
+        to_dot(&graph, arguments.all)
     } else if arguments.svg {
         svg::write(&graph, arguments.all)
     } else {
-        in_text(&graph)
+        graph.silent.iter().fold(in_text(&graph), |text, silence| format!("{text}\n{}", silence.text()))
     };
     match &arguments.output {
         Some(file) => write_whole(file, &(text + "\n"))?,
@@ -86,18 +85,17 @@ impl Graph {
         let nodes = running.shown();
         let mut tracks: Vec<Tracks> = nodes.iter().map(|_| Tracks::new(Duration::MAX)).collect();
         let stop = Stop::new()?;
-        let (before, _) = look(running, &nodes, &mut tracks)?;
+        let before = look(running, &nodes, &mut tracks)?;
         let began = Instant::now();
         // Ctrl-C ends it early: the observation is then shorter.
         stop.within(long);
-        let (surveys, away) = look(running, &nodes, &mut tracks)?;
+        let seen = look(running, &nodes, &mut tracks)?;
         let interval_s = began.elapsed().as_secs_f64();
-        let away_names: Vec<&str> = away.iter().map(|silence| silence.node.as_str()).collect();
-        let survey = Survey::joined(surveys, &away_names, &running.installation);
+        let (survey, away) = running.joined(seen);
         let mut names = Names { running, survey: &survey, vocabulary: Vocabulary::default() };
         let mut edges: Vec<Edge> = Vec::new();
         // Packages that a router delivers for an observed node are counted there.
-        let is_seen = |node: &str| nodes.contains(&node) && !away_names.contains(&node);
+        let is_seen = |node: &str| nodes.contains(&node) && away.iter().all(|silence| silence.node != node);
         let counts = |node: &str, flow: &FlowInfo| {
             !is_hop(&running.installation, node, flow) || !is_seen(running.node_of(flow.from))
         };
@@ -158,11 +156,11 @@ impl Graph {
 }
 
 /// From writers of streams to their readers. Nobody sends a record: a reader looks at it where it was written.
-fn stream_edges(names: &mut Names<'_>, before: &[Survey], silent: bool, interval_s: f64) -> Vec<Edge> {
+fn stream_edges(names: &mut Names<'_>, before: &NodeReports, silent: bool, interval_s: f64) -> Vec<Edge> {
     let mut edges = Vec::new();
     let survey = names.survey;
     for StreamSurvey { node, info, .. } in &survey.streams {
-        let earlier = before.iter().flat_map(|survey| &survey.streams);
+        let earlier = before.iter().flatten().flat_map(|survey| &survey.streams);
         let earlier = earlier.filter(|known| (&known.node, known.info.id) == (node, info.id)).map(|known| &known.info);
         // Of a ring that was made anew, all.
         let records =
@@ -187,19 +185,18 @@ fn stream_edges(names: &mut Names<'_>, before: &[Survey], silent: bool, interval
     edges
 }
 
+/// What nodes report, or why they do not.
+type NodeReports = Vec<Result<Survey, Silence>>;
+
 /// Observes all nodes, and records what each module sends.
-fn look(running: &Running, nodes: &[&str], tracks: &mut [Tracks]) -> Result<(Vec<Survey>, Vec<Silence>), Failure> {
-    let (mut surveys, mut silent) = (Vec::new(), Vec::new());
-    for (seen, tracks) in running.look_at(nodes, Scope::All)?.into_iter().zip(tracks) {
-        match seen {
-            Ok(survey) => {
-                tracks.look(survey.at_ns, survey.flows.iter().filter(|flow| flow.to != Name::NONE).cloned());
-                surveys.push(survey);
-            }
-            Err(silence) => silent.push(silence),
+fn look(running: &Running, nodes: &[&str], tracks: &mut [Tracks]) -> Result<NodeReports, Failure> {
+    let seen = running.look_at(nodes, Scope::All)?;
+    for (seen, tracks) in seen.iter().zip(tracks) {
+        if let Ok(survey) = seen {
+            tracks.look(survey.at_ns, survey.flows.iter().filter(|flow| flow.to != Name::NONE).cloned());
         }
     }
-    Ok((surveys, silent))
+    Ok(seen)
 }
 
 /// Resolves names and numbers.
@@ -250,11 +247,6 @@ impl Names<'_> {
 }
 
 fn in_text(graph: &Graph) -> String {
-    let silent: String = graph.silent.iter().map(|silence| format!("\n{}", silence.text())).collect();
-    edges_in_text(graph) + &silent
-}
-
-fn edges_in_text(graph: &Graph) -> String {
     if graph.edges.is_empty() {
         return format!("no package was sent within {:.1} s; --silent shows earlier senders", graph.interval_s);
     }

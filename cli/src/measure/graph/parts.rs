@@ -1,9 +1,10 @@
-//! The parts of a graph: modules, and edges with their content.
+//! The parts of a graph: modules, and edges with their content; and the graph for Graphviz.
 
 use crate::look::observer::Silence;
 use rohrpost::output::plain;
 use rohrpost_launch::survey::Standing;
 use serde::Serialize;
+use std::fmt::Write;
 
 /// Modules and the edges between them.
 #[derive(Serialize)]
@@ -94,7 +95,6 @@ impl Edge {
         self.refused += other.refused;
     }
 
-    /// Its label in a drawing.
     pub(super) fn label(&self) -> String {
         format!("{} {}", plain::line(&self.what), self.rate())
     }
@@ -106,4 +106,35 @@ impl Edge {
             rate => format!("{rate:.0}/s"),
         }
     }
+}
+
+pub(super) fn to_dot(graph: &Graph, all: bool) -> String {
+    let mut text = String::from("digraph rohrpost {\n");
+    let _ = writeln!(text, "    label = {:?}", graph.title());
+    text.push_str("    rankdir = LR\n    node [shape = box, style = rounded, fontname = \"sans-serif\"]\n");
+    text.push_str("    edge [fontname = \"sans-serif\", fontsize = 10]\n");
+    for module in &graph.modules {
+        let below = graph.below(module).map(|line| format!("\\n{line}"));
+        let dead = if module.is_down() { ", style = \"rounded,dashed\"" } else { "" };
+        let _ = writeln!(
+            text,
+            "    {:?} [label = \"{}{}\"{dead}]",
+            module.module,
+            module.module,
+            below.collect::<String>()
+        );
+    }
+    for edge in graph.drawn(all) {
+        let style = match edge.carries {
+            Carries::Data => "",
+            Carries::Stream => ", color = \"#2a6fb5\", style = bold",
+            Carries::Command | Carries::Common => ", style = bold, color = \"#b5432a\"",
+            Carries::Reply => ", style = dotted",
+            Carries::Output => ", color = gray",
+        };
+        let label = edge.label();
+        let _ = writeln!(text, "    {:?} -> {:?} [label = {label:?}{style}]", edge.from, edge.to);
+    }
+    text.push('}');
+    text
 }

@@ -27,7 +27,8 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
     let mut plan = VisualGraph::new(Orientation::LeftToRight);
     let edges: Vec<&Edge> = graph.drawn(all).collect();
     let in_use = |module: &&Module| {
-        !module.is_left_out && (module.state != "tool" || edges.iter().any(|edge| edge.touches(&module.module)))
+        !module.is_left_out
+            && (module.state != "tool" || edges.iter().any(|edge| [&edge.from, &edge.to].contains(&&module.module)))
     };
     let modules: Vec<&Module> = graph.modules.iter().filter(in_use).collect();
     let boxes: Vec<_> = modules.iter().map(|module| plan.add_node(box_of(graph, module))).collect();
@@ -43,12 +44,6 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
         plan.do_it(false, false, false, &mut drawing);
     }
     drawing.finish(&graph.title())
-}
-
-impl Edge {
-    fn touches(&self, module: &str) -> bool {
-        self.from == module || self.to == module
-    }
 }
 
 fn box_of(graph: &Graph, module: &Module) -> Element {

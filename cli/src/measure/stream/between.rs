@@ -9,7 +9,6 @@
 use rohrpost::fusion::{Heading, Interpolate, Share};
 use rohrpost::schema::{Field, Members, Type, Value};
 
-/// Unit of a heading.
 const HEADING_UNIT: &str = "rad";
 
 /// The value of this field so much of the way from one to the other, both of its type.

@@ -147,7 +147,7 @@ pub(crate) fn too_large_for_data(running: &Running, module: Name, item: &DataIte
 }
 
 /// What a module's description says of its stream.
-pub(super) fn item_of(running: &Running, id: StreamId) -> Option<DataItem> {
+pub(crate) fn item_of(running: &Running, id: StreamId) -> Option<DataItem> {
     noted(&running.node, id.name)?.streams().find(|item| item.number == id.number).cloned()
 }
 
@@ -169,7 +169,6 @@ impl ChosenStream {
         self.running.node.inspect_stream(self.id).map_err(|error| self.failure(&error))
     }
 
-    /// The stream as it is now.
     pub(super) fn inspect(&self) -> Result<StreamInfo, Failure> {
         self.look()?.ok_or_else(|| self.missing())
     }
@@ -188,26 +187,6 @@ impl ChosenStream {
         }
         format!("{name} has no stream {}; it has {}", self.id.number, own.join(", ")).into()
     }
-}
-
-/// Modules with streams here, for completions.
-pub(crate) fn completed_names(target: &Target) -> Vec<String> {
-    let Ok(running) = target.find() else { return Vec::new() };
-    let mut names: Vec<Name> = running.node.streams().unwrap_or_default().iter().map(|id| id.name).collect();
-    names.dedup();
-    names.into_iter().map(|name| running.text(name)).collect()
-}
-
-/// Streams of the module that one of these words names, for completions: by name, with a text, where that is known.
-pub(crate) fn completed_items(target: &Target, words: &[String]) -> Vec<(String, String)> {
-    let Ok(running) = target.find() else { return Vec::new() };
-    let named = words.iter().find_map(|word| running.name(word).ok());
-    let all = running.node.streams().unwrap_or_default();
-    let item = |id: &StreamId| match item_of(&running, *id) {
-        Some(item) => (item.field.name, item.field.text),
-        None => (id.number.to_string(), String::new()),
-    };
-    all.iter().filter(|id| Some(id.name) == named).map(item).collect()
 }
 
 #[cfg(test)]

@@ -2,10 +2,9 @@
 
 use super::between::between;
 use super::choice::{ChosenStream, StreamChoice};
-use super::moment::{StreamMoment, parse_moment};
 use super::output::{RecordContent, RecordForm, RecordObject};
 use super::refusal::{AroundRefusal, around_or_refusal};
-use super::stamp::stamp_text;
+use super::stamp::{StreamMoment, parse_moment, stamp_text};
 use crate::terminal::units::{LOOK, Stop};
 use crate::terminal::{Failure, say, say_folded};
 use rohrpost::Name;

@@ -9,7 +9,6 @@ mod between;
 mod choice;
 mod interp;
 mod list;
-mod moment;
 mod output;
 mod read;
 mod refusal;
@@ -18,7 +17,7 @@ mod view;
 mod write;
 
 use crate::terminal::Failure;
-pub(crate) use choice::{completed_items, completed_names, too_large_for_data};
+pub(crate) use choice::{item_of, too_large_for_data};
 pub(crate) use stamp::{Offset, parse_offset, parse_stamp, stamp_text};
 use std::process::ExitCode;
 pub(crate) use view::{StreamView, name_items, print_streams, stream_views};

@@ -86,7 +86,6 @@ impl RecordForm {
         }
     }
 
-    /// A record as an object.
     pub(super) fn object(
         self,
         side: Option<&'static str>,
@@ -101,7 +100,6 @@ impl RecordForm {
         RecordObject { side, record: RecordView::new(record, monotonic_ns()), value, unreadable, hex }
     }
 
-    /// A record in one line.
     pub(super) fn line(
         self,
         side: Option<&'static str>,

@@ -1,9 +1,9 @@
 //! `stream read`.
 
 use super::choice::{ChosenStream, StreamChoice};
-use super::moment::{StreamMoment, parse_moment};
 use super::output::{RecordForm, RecordOutput};
 use super::refusal::around_or_refusal;
+use super::stamp::{StreamMoment, parse_moment};
 use crate::terminal::Failure;
 use crate::terminal::units::{LOOK, Stop, seconds, size_argument};
 use rohrpost::Name;

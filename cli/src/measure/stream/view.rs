@@ -12,7 +12,6 @@ use rohrpost_mailbox::{Missed, RecordInfo, StreamId};
 use serde::Serialize;
 use std::time::Duration;
 
-/// A stream.
 #[derive(Serialize)]
 pub(crate) struct StreamView {
     node: String,
@@ -57,13 +56,6 @@ impl From<Missed> for MissedView {
     }
 }
 
-impl MissedView {
-    fn text(&self) -> String {
-        let Self { lost, sampled, passed_over } = self;
-        format!("{lost} lost on the way, {sampled} left out by sampling, {passed_over} passed over by present readers")
-    }
-}
-
 #[derive(Serialize)]
 struct WriterView {
     module: Option<String>,
@@ -98,12 +90,6 @@ impl RecordView {
         let Self { sequence, epoch, len_bytes, .. } = self;
         let (stamp, age) = (stamp_text(self.stamp_ns), short(self.age_s));
         format!("#{sequence}, stamp {stamp} of epoch {epoch}, {len_bytes} B, written {age} ago")
-    }
-}
-
-impl WriterView {
-    fn text(&self) -> String {
-        writer_text(self.module.as_deref(), self.pid)
     }
 }
 
@@ -151,7 +137,7 @@ impl StreamView {
     fn written_by(&self, writer: &WriterView) -> String {
         match &self.origin {
             Some(node) => format!("the router, from node {node}"),
-            None => writer.text(),
+            None => writer_text(writer.module.as_deref(), writer.pid),
         }
     }
 }
@@ -195,7 +181,6 @@ pub(crate) fn print_streams(streams: &[StreamView], several: bool) -> String {
     table_of(&heads[first..], rows)
 }
 
-/// All that is known of one stream.
 pub(super) fn print_stream(stream: &StreamView) -> String {
     let writer = match &stream.writer {
         None => "nobody yet".into(),
@@ -211,6 +196,7 @@ pub(super) fn print_stream(stream: &StreamView) -> String {
         "{} of {} seats in use; {} hold a record, {} sleep",
         stream.readers, stream.readers_max, stream.holding, stream.sleeping
     );
+    let MissedView { lost, sampled, passed_over } = stream.missed;
     let facts = [
         ("writer", writer),
         ("readers", readers),
@@ -219,7 +205,12 @@ pub(super) fn print_stream(stream: &StreamView) -> String {
         ("late", late),
         ("written", stream.written.to_string()),
         ("refused", stream.refused.to_string()),
-        ("missed", stream.missed.text()),
+        (
+            "missed",
+            format!(
+                "{lost} lost on the way, {sampled} left out by sampling, {passed_over} passed over by present readers"
+            ),
+        ),
         ("newest", record(&stream.newest)),
         ("oldest", record(&stream.oldest)),
         ("adoptions", stream.adoptions.to_string()),

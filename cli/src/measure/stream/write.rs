@@ -81,7 +81,6 @@ fn named(chosen: &ChosenStream, error: &str) -> String {
     error.replace(&chosen.id.to_string(), &chosen.text())
 }
 
-/// So many delays.
 fn nth_ns(delay: Duration, at: u32) -> u64 {
     u64::try_from(delay.as_nanos() * u128::from(at)).unwrap_or(u64::MAX)
 }

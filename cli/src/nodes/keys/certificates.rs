@@ -1,24 +1,21 @@
 //! The certificates of the TCP router and of a system's nodes: sessions are sealed, and each end proves its identity.
 
-mod error;
 mod shown;
-mod written;
 
-use error::CertificateError;
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose,
     date_time_ymd,
 };
-use rohrpost_config::{Installation, open_secret};
+use rohrpost_config::{Installation, KeysError, open_secret};
 use rohrpost_mailbox::realtime_ns;
-use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, is_about};
+use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, SealError, is_about};
 pub(crate) use shown::lacking;
 pub(super) use shown::show;
-use std::fs;
-use std::io;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use written::{PUBLIC, SECRET, Written};
 
 pub(super) const DAY: Duration = Duration::from_secs(24 * 3600);
 /// Validity of the authority's own certificate, days.
@@ -101,11 +98,10 @@ pub(crate) fn make(installation: &Installation, which: Renewal, days: u32) -> Re
             made.extend(issue(&folder, issuer?, &holder, days)?);
         }
     }
-    written::put(&folder, &made, || if which == Renewal::WithAuthority { keep_aside(&folder) } else { Ok(()) })?;
+    put(&folder, &made, || if which == Renewal::WithAuthority { keep_aside(&folder) } else { Ok(()) })?;
     Ok(made.into_iter().map(|made| made.path).collect())
 }
 
-/// The signing authority.
 struct Signing {
     authority: Authority,
     /// None if its key is not here.
@@ -226,4 +222,99 @@ fn issue(
 fn hold(params: &mut CertificateParams, days: u32) {
     let now = date_time_ymd(1970, 1, 1) + Duration::from_nanos(realtime_ns());
     (params.not_before, params.not_after) = (now - BEFORE, now + days * DAY);
+}
+
+/// Why certificates cannot be made or read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CertificateError {
+    #[error("{0}: {1}")]
+    File(PathBuf, io::Error),
+    /// Other users may read a key.
+    #[error(transparent)]
+    Open(#[from] KeysError),
+    #[error(transparent)]
+    Authority(#[from] SealError),
+    /// Only half of the authority is there.
+    #[error(
+        "{certificate} is there, and {secret} is not: without it nothing can be signed. Bring it from where the \
+         authority was made; if it is lost, `rohrpost keys rotate --authority {file}` begins anew, and then the same \
+         without `--authority` for each other system of the installation",
+        certificate = .0.display(), secret = .1.display(), file = .2.display()
+    )]
+    NoKey(PathBuf, PathBuf, PathBuf),
+    #[error(
+        "{secret} is not the key of {certificate}: they are of two authorities. Bring both from where one of them was \
+         made, or `rohrpost keys rotate --authority {file}` begins anew",
+        certificate = .0.display(), secret = .1.display(), file = .2.display()
+    )]
+    OtherKey(PathBuf, PathBuf, PathBuf),
+    /// A file holds no valid key, or a certificate cannot be made.
+    #[error("{0}: {1}")]
+    Unfit(PathBuf, rcgen::Error),
+}
+
+/// Permissions of a file.
+pub(super) const SECRET: u32 = 0o600;
+pub(super) const PUBLIC: u32 = 0o644;
+
+/// A file that will be written.
+pub(super) struct Written {
+    pub(super) path: PathBuf,
+    pub(super) text: String,
+    /// Its permissions.
+    pub(super) mode: u32,
+}
+
+impl Written {
+    /// Its temporary name.
+    fn beside(&self) -> PathBuf {
+        let mut beside = self.path.clone().into_os_string();
+        beside.push(".new");
+        beside.into()
+    }
+
+    /// Writes it under its temporary name. Nothing that has this name is touched: it may be a user's.
+    fn write(&self) -> Result<(), CertificateError> {
+        let (beside, failed) = (self.beside(), |error| CertificateError::File(self.path.clone(), error));
+        let opened = OpenOptions::new().write(true).create_new(true).mode(self.mode).open(&beside);
+        let mut file = opened.map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => KeysError::Left(beside.clone()).into(),
+            _ => failed(error),
+        })?;
+        let written = file.write_all(self.text.as_bytes()).and_then(|()| file.sync_all());
+        written.inspect_err(|_| _ = fs::remove_file(&beside)).map_err(failed)
+    }
+}
+
+/// Moves the files into the folder in this order, after `before`; they replace older ones. If they cannot be written,
+/// nothing changes.
+pub(super) fn put(
+    folder: &Path,
+    files: &[Written],
+    before: impl FnOnce() -> Result<(), CertificateError>,
+) -> Result<(), CertificateError> {
+    if files.is_empty() {
+        return Ok(());
+    }
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |error| CertificateError::File(path, error)
+    };
+    fs::create_dir_all(folder).map_err(failed(folder))?;
+    let mut made = Vec::new();
+    let written = files.iter().try_for_each(|file| {
+        file.write()?;
+        made.push(file.beside());
+        Ok(())
+    });
+    written.and_then(|()| before()).inspect_err(|_| {
+        for beside in made {
+            let _ = fs::remove_file(beside);
+        }
+    })?;
+    for file in files {
+        fs::rename(file.beside(), &file.path).map_err(failed(&file.path))?;
+    }
+    // Otherwise a crash of the computer may lose the names.
+    File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed(folder))
 }

@@ -3,6 +3,7 @@
 pub(crate) mod certificates;
 
 use crate::begin::check::load;
+use crate::terminal::units::counted;
 use crate::terminal::{Failure, say};
 use certificates::Renewal;
 use clap::{Args, Subcommand};
@@ -58,11 +59,9 @@ struct Place {
     days: u32,
 }
 
-/// The files that keys are made for.
 struct KeyFiles {
     /// The file of the keys that seal datagrams, if there are to be any.
     datagrams: Option<PathBuf>,
-    /// The installation, for its certificates.
     installation: Option<Installation>,
 }
 
@@ -162,8 +161,7 @@ fn age(file: &Path) -> Option<String> {
     let days = |since: Duration| since.as_secs() / certificates::DAY.as_secs();
     let ago = match file.metadata().ok()?.modified().ok()?.elapsed().map(days) {
         Ok(0) => "less than a day ago".into(),
-        Ok(1) => "1 day ago".into(),
-        Ok(days) => format!("{days} days ago"),
+        Ok(days) => format!("{} ago", counted(days, "day")),
         Err(_) => "at a time in the future of this clock".into(),
     };
     Some(format!("{}: written {ago}", file.display()))

@@ -10,10 +10,12 @@ use crate::nodes::round::{Round, Rounds};
 use crate::nodes::vocabulary::Vocabulary;
 use crate::terminal::{Failure, say};
 use node_report::{NodeReport, rates};
+use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondLink, ClassPassed, LinkCounters, RouterInterface, SlotState,
     TcpInterface, TunnelState,
 };
+use rohrpost::serde::de::DeserializeOwned;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -75,7 +77,6 @@ pub(crate) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
         wait = round.interval;
         stopped = round.stop.within(wait);
     }
-    round.close();
     Ok(if well || (stopped && rounds.watch) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -111,20 +112,21 @@ fn ask(round: &mut Round, node: String) -> NodeReport {
 }
 
 fn ask_router(round: &mut Round, node: String) -> NodeReport {
-    let links = round.newest(&node, RouterInterface::LINKS);
-    // A router without a clock publishes none, and one without slots publishes none.
-    let clock = links.as_ref().ok().and_then(|_| round.newest(&node, RouterInterface::CLOCK).ok());
-    let in_slots = links.is_ok() && round.running.installation.tdma.is_some();
-    let slots = in_slots.then(|| round.newest(&node, RouterInterface::SLOTS).ok()).flatten();
-    let declares = links.is_ok() && !round.running.installation.flows.is_empty();
-    let flows = declares.then(|| round.newest(&node, RouterInterface::FLOWS).ok()).flatten();
-    let replicates = links.is_ok() && !round.running.installation.replicas.is_empty();
-    let replicas = replicates.then(|| round.newest(&node, RouterInterface::REPLICAS).ok()).flatten();
-    let (time_ns, links, failure) = match links {
-        Ok((time_ns, links)) => (time_ns, Some(links), None),
-        Err(failure) => (0, None, Some(failure)),
+    let (time_ns, links) = match round.newest(&node, RouterInterface::LINKS) {
+        Ok(told) => told,
+        Err(failure) => return NodeReport { node, failure: Some(failure), ..NodeReport::default() },
     };
-    let (clock, slots) = (clock.map(|(_, clock)| clock), slots.map(|(_, slots)| slots));
-    let (flows, replicas) = (flows.map(|(_, flows)| flows), replicas.map(|(_, replicas)| replicas));
-    NodeReport { node, time_ns, links, clock, slots, flows, replicas, failure, ..NodeReport::default() }
+    let installation = &round.running.installation;
+    let in_slots = installation.tdma.is_some();
+    let (declares, replicates) = (!installation.flows.is_empty(), !installation.replicas.is_empty());
+    // A router without a clock publishes none, and one without slots publishes none.
+    let clock = newest_if(true, round, &node, RouterInterface::CLOCK);
+    let slots = newest_if(in_slots, round, &node, RouterInterface::SLOTS);
+    let flows = newest_if(declares, round, &node, RouterInterface::FLOWS);
+    let replicas = newest_if(replicates, round, &node, RouterInterface::REPLICAS);
+    NodeReport { node, time_ns, links: Some(links), clock, slots, flows, replicas, ..NodeReport::default() }
+}
+
+fn newest_if<T: DeserializeOwned>(there: bool, round: &mut Round, node: &str, port: DataPort<T>) -> Option<T> {
+    there.then(|| round.newest(node, port).ok()).flatten().map(|(_, value)| value)
 }

@@ -5,7 +5,6 @@ use rohrpost::interfaces::{
 };
 use serde::Serialize;
 
-/// The report of a node's router.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct NodeReport {
     pub(super) node: String,

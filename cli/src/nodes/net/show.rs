@@ -3,50 +3,38 @@
 use super::beyond;
 use super::node_report::NodeReport;
 use crate::look::target::Running;
+use crate::nodes::flows;
 use crate::nodes::quantities::counted;
-use crate::nodes::slots::kept;
+use crate::nodes::slots::{by_class, kept};
 use crate::nodes::vocabulary::Vocabulary;
-use crate::nodes::{carried, flows};
 use crate::terminal::table::{table, time};
-use crate::terminal::units::{bytes, fine};
-use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected, ReplicaState};
+use crate::terminal::units::{self, bytes, fine};
+use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, Rejected, ReplicaState};
 use rohrpost::output::plain;
 use std::time::Duration;
 
 /// The whole report: a table of links, and tables of queues, losses and clocks, if there are any.
 pub(super) fn text(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) -> String {
     let mut parts = vec![links(all)];
-    parts.extend(
-        all.iter()
-            .filter_map(|told| told.failure.as_ref().map(|why| (told, why)))
-            .map(|(told, why)| format!("node {}: {}\n", told.node, plain::line(why))),
-    );
-    let refused = |peer: &&PeerLink| !peer.why.is_empty();
-    for told in all {
-        for peer in told.links.iter().flat_map(|links| &links.peers).filter(refused) {
-            parts.push(format!(
-                "node {} and node {} refuse each other: {}\n",
-                told.node,
-                peer.node,
-                plain::line(&peer.why)
-            ));
+    let failed = all.iter().filter_map(|told| Some((&told.node, told.failure.as_ref()?)));
+    parts.extend(failed.map(|(node, why)| format!("node {node}: {}\n", plain::line(why))));
+    for (links, peer) in reports(all).flat_map(|links| links.peers.iter().map(move |peer| (links, peer))) {
+        if !peer.why.is_empty() {
+            let why = plain::line(&peer.why);
+            parts.push(format!("node {} and node {} refuse each other: {why}\n", links.node, peer.node));
         }
     }
-    let slots = all.iter().filter_map(|told| told.slots.as_ref());
-    parts.extend([
-        strangers(all),
-        rejections(all),
-        failures(all),
-        waiting(all),
-        losses(running, all),
-        clocks(all),
-        kept(slots),
-    ]);
-    parts.push(measured(running, all, vocabulary));
-    parts.push(replicas(all));
+    parts.extend([strangers(all), rejections(all), failures(all), waiting(all), losses(running, all), clocks(all)]);
+    parts.push(kept(all.iter().filter_map(|told| told.slots.as_ref())));
+    parts.extend([measured(running, all, vocabulary), replicas(all)]);
     parts.extend(beyond::text(running, all));
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
+}
+
+/// What the routers that answer report of their links.
+fn reports(all: &[NodeReport]) -> impl Iterator<Item = &Links> {
+    all.iter().filter_map(|told| told.links.as_ref())
 }
 
 fn links(all: &[NodeReport]) -> String {
@@ -88,14 +76,14 @@ fn state(state: LinkState) -> &'static str {
 /// Rejected datagrams from unknown senders or from a peer with an unexpected identity, and what to do.
 fn strangers(all: &[NodeReport]) -> String {
     let mut text = String::new();
-    for links in all.iter().filter_map(|told| told.links.as_ref()) {
+    for links in reports(all) {
         for peer in links.peers.iter().filter(|peer| peer.counters.refused > 0) {
             text += &format!(
                 "node {}: {} refused that came from {}, the address of node {}: they were of another configuration or \
                  version (launch all nodes from the same file; `rohrpost version`), or of a router of it that is \
                  over\n",
                 links.node,
-                datagrams(peer.counters.refused),
+                units::counted(peer.counters.refused, "datagram"),
                 peer.address,
                 peer.node
             );
@@ -106,7 +94,7 @@ fn strangers(all: &[NodeReport]) -> String {
                  router's socket full: if another installation uses this network, give one of them another `port` in \
                  [network]\n",
                 links.node,
-                datagrams(links.foreign)
+                units::counted(links.foreign, "datagram")
             );
         }
     }
@@ -115,8 +103,7 @@ fn strangers(all: &[NodeReport]) -> String {
 
 /// Datagrams with a missing or wrong seal, by their apparent sender.
 fn rejections(all: &[NodeReport]) -> String {
-    let links = all.iter().filter_map(|told| told.links.as_ref());
-    let told = links.flat_map(|links| links.rejections.iter().map(|rejected| (&links.node, rejected)));
+    let told = reports(all).flat_map(|links| links.rejections.iter().map(|rejected| (&links.node, rejected)));
     let rows: Vec<_> = told
         .map(|(node, Rejected { node: from, cause, datagrams })| {
             let from = if from.is_empty() { "no node" } else { from };
@@ -126,22 +113,18 @@ fn rejections(all: &[NodeReport]) -> String {
     if rows.is_empty() { String::new() } else { table(["node", "not taken from", "cause", ">datagrams"], rows) }
 }
 
-fn datagrams(count: u64) -> String {
-    if count == 1 { "1 datagram".into() } else { format!("{count} datagrams") }
-}
-
 /// Errors that computers returned. "Nobody listens" is not shown: that node is silent already.
 fn failures(all: &[NodeReport]) -> String {
-    let links = all.iter().filter_map(|told| told.links.as_ref());
-    let all = links.flat_map(|links| links.failures.iter().map(|failure| (&links.node, failure)));
+    let all = reports(all).flat_map(|links| links.failures.iter().map(|failure| (&links.node, failure)));
     let told = all.filter(|(_, failure)| failure.cause != "nobody-there");
-    told.map(|(node, failure)| format!("node {node}: {} not sent: {}\n", datagrams(failure.times), failure.cause))
-        .collect()
+    told.map(|(node, failure)| {
+        format!("node {node}: {} not sent: {}\n", units::counted(failure.times, "datagram"), failure.cause)
+    })
+    .collect()
 }
 
 fn waiting(all: &[NodeReport]) -> String {
-    let links = all.iter().filter_map(|told| told.links.as_ref());
-    let queues = links.filter(|links| !links.waiting.is_empty()).map(|links| {
+    let queues = reports(all).filter(|links| !links.waiting.is_empty()).map(|links| {
         let levels: Vec<String> =
             links.waiting.iter().map(|level| format!("{} on level {}", level.packages, level.level)).collect();
         let memory = bytes(links.waiting_bytes as f64);
@@ -152,13 +135,12 @@ fn waiting(all: &[NodeReport]) -> String {
 
 /// Classes with losses; the others are in the JSON.
 fn losses(running: &Running, all: &[NodeReport]) -> String {
-    let links = all.iter().filter_map(|told| told.links.as_ref());
-    carried::by_class(&running.installation, links, |class| !class.lost.is_empty())
+    by_class(&running.installation, reports(all), |class| !class.lost.is_empty())
 }
 
 /// Declared flows; empty if there is none.
 fn measured(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) -> String {
-    let links: Vec<&Links> = all.iter().filter_map(|told| told.links.as_ref()).collect();
+    let links: Vec<&Links> = reports(all).collect();
     let states = all.iter().filter_map(|told| told.flows.as_ref());
     let table =
         flows::measured(&running.installation, states, &links, vocabulary, |module| running.describe(module).ok());

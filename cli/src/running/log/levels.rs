@@ -1,7 +1,6 @@
 //! Lists modules' output levels, and sets them at run time.
 
-use super::arguments::Arguments;
-use super::filter;
+use super::arguments::{self, Arguments};
 use crate::look::target::Running;
 use crate::running::call;
 use crate::terminal::table::table;
@@ -19,13 +18,12 @@ pub(super) struct Setting {
 }
 
 impl Setting {
-    /// Parses a module or a class, and a level.
     pub(super) fn read(name: &str, level: &str, running: &Running) -> Result<Self, Failure> {
         let level = call::level_of(level)?;
         if name.contains('.') {
-            return Ok(Self { modules: vec![filter::module(name, running)?], level });
+            return Ok(Self { modules: vec![arguments::module(name, running)?], level });
         }
-        let class = filter::class(name, &running.installation)?;
+        let class = arguments::class(name, &running.installation)?;
         let of_class = |module: &&Module| module.names().any(|name| name.class() == class);
         let nodes = running.shown();
         let meant = running.installation.modules.iter().filter(|module| nodes.contains(&module.node.as_str()));
@@ -97,7 +95,6 @@ struct LevelRow {
     failure: Option<String>,
 }
 
-/// Lists the levels of all modules.
 pub(super) fn list(running: &Running, json: bool, tool: &mut ToolLink) -> Result<ExitCode, Failure> {
     let mut lines = Vec::new();
     for (module, silence) in running.modules_to_ask()? {

@@ -6,12 +6,20 @@
 
 use crate::look::target::Running;
 use crate::terminal::Failure;
+use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::output::OutputLine;
 use rohrpost::{CallError, Fault, Name, ToolLink};
+use rohrpost_config::Installation;
 
 /// Number of `lines_from` in the collector's interface.
 pub(crate) const LINES_FROM: u16 = 16;
+
+/// The collector of output of an installation, also where that has no such module; none without its class.
+pub(crate) fn collector(installation: &Installation) -> Option<Name> {
+    let class = installation.classes.id(CollectorInterface::CLASS)?;
+    Some(Name::new(installation.system.id, class.0, 0, 0))
+}
 
 pub(super) struct Reader<'a> {
     running: &'a Running,

@@ -1,8 +1,7 @@
 //! Lines of output from recordings: always the one that arrived first of those that are next in their files.
 
-use super::arguments::Arguments;
-use super::filter::Filter;
-use super::show::Show;
+use super::arguments::{Arguments, Filter};
+use super::{Show, keep_last};
 use crate::look::{parse_name, unknown_module};
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;
@@ -43,12 +42,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         None => drop(chosen.all(|line| show.line(&line))),
         Some(count) => {
             let mut last = VecDeque::new();
-            for line in chosen {
-                last.push_back(line);
-                if last.len() > count {
-                    last.pop_front();
-                }
-            }
+            chosen.for_each(|line| keep_last(&mut last, line, count));
             last.iter().all(|line| show.line(line));
         }
     }
@@ -69,7 +63,6 @@ fn recorded_installation(infos: &[Info]) -> Result<Installation, Failure> {
     Err(format!("no recording has a configuration that is read here; name one with --config{why}").into())
 }
 
-/// The module, alias or tool of this name.
 fn find(text: &str, installation: &Installation) -> Result<Name, Failure> {
     let name = parse_name(installation, text, Vec::new)?.module();
     let is_known = installation.module(name).is_some() || name.class() == installation.classes.tool();
@@ -109,7 +102,6 @@ fn flaws(info: &Info) -> Vec<String> {
     flaws
 }
 
-/// The lines of several files.
 struct RecordedLines {
     sources: Vec<LineSource>,
 }

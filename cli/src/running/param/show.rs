@@ -1,6 +1,6 @@
 //! `param list` and `param get`.
 
-use super::session::{Session, find, no_parameters};
+use super::{Session, find, no_parameters};
 use crate::terminal::table::table;
 use crate::terminal::{Failure, complain, say};
 use rohrpost::parameter::{Parameter, value_text};

@@ -17,7 +17,6 @@ pub(super) struct App {
     pub(super) prompt: Prompt,
     /// None: in the order of the configuration.
     pub(super) sort: Option<Column>,
-    /// Columns that fit on the screen.
     pub(super) columns: Vec<Column>,
     pub(super) reversed: bool,
     /// Only modules with this text in their name.
@@ -31,7 +30,6 @@ pub(super) struct App {
     pub(super) message: Option<String>,
 }
 
-/// The content of the screen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Screen {
     Table,
@@ -49,7 +47,6 @@ pub(super) enum Prompt {
     Restart(Name),
 }
 
-/// The filter of output lines.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct LineFilter {
     pub(super) level: OutputLevel,
@@ -104,7 +101,6 @@ impl App {
         rows.iter().position(|row| Some(row.name) == self.selected).unwrap_or(0)
     }
 
-    /// Handles a key.
     pub(super) fn key(&mut self, key: KeyEvent, model: &Model) -> Option<ScreenAction> {
         if key.modifiers.contains(KeyModifiers::CONTROL) {
             return (key.code == KeyCode::Char('c')).then_some(ScreenAction::Quit);

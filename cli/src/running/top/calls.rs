@@ -1,28 +1,22 @@
 //! The calls of `top`: to switch modules on and off, for output lines, for the causes of errors. Nothing here blocks:
 //! calls are begun, and polled in each round, so that a module that hangs freezes no screen.
 
-use crate::look::observer::{Silence, silence};
+use crate::look::observer::{PATIENCE, Silence, Tool, silence};
 use crate::look::target::Running;
 use rohrpost::CallError;
+use rohrpost::Name;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::wire::{append, from_bytes};
-use rohrpost::{Name, ToolLink};
 use rohrpost_launch::launcher::{AskLaunch, ControlError, SnapshotRequest, launcher_of};
 use rohrpost_launch::survey::{Distant, Scope, Snapshot, Survey};
-use std::time::Duration;
 
-/// Timeout for an answer.
-pub(super) const PATIENCE: Duration = Duration::from_secs(1);
-
-/// A call that is under way.
 struct Call {
     sequence: u32,
     to: Name,
     purpose: Purpose,
 }
 
-/// The purpose of its answer.
 enum Purpose {
     Switch(bool),
     Lines,
@@ -32,17 +26,17 @@ enum Purpose {
 
 /// The result of a call.
 pub(super) enum Answer {
-    Switched(Name, bool, Result<(), String>),
+    /// What came of a key.
+    Done(String),
     Lines(Result<Page, String>),
     Why(Name, String),
-    Restarted(Name, Result<(), String>),
     /// Another node's report, or why it does not answer.
     Snapshot(String, Result<Survey, Silence>),
 }
 
 /// The place of `top` among the callers.
 pub(super) struct Calls {
-    tool: ToolLink,
+    tool: Tool,
     under_way: Vec<Call>,
     /// Observes other nodes.
     looks: Vec<(String, Distant)>,
@@ -52,11 +46,6 @@ impl Calls {
     /// Takes part as a tool.
     pub(super) fn join(running: &Running) -> Result<Self, crate::terminal::Failure> {
         Ok(Self { tool: running.join(PATIENCE)?, under_way: Vec::new(), looks: Vec::new() })
-    }
-
-    /// Releases the place.
-    pub(super) fn close(self) {
-        self.tool.close();
     }
 
     pub(super) fn switch(&mut self, running: &Running, module: Name, on: bool) -> Option<Answer> {
@@ -75,7 +64,6 @@ impl Calls {
         self.begun(running, collector, Purpose::Lines, begun)
     }
 
-    /// Asks launch to restart a module.
     pub(super) fn restart(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let launcher = running.launcher_of(module).unwrap_or(self.tool.launcher());
         let begun = self.tool.begin_restart(launcher, &running.text(module));
@@ -154,14 +142,17 @@ impl Calls {
     fn answer(&mut self, running: &Running, to: Name, purpose: Purpose, bytes: &[u8]) -> Option<Answer> {
         let unread = |error: &dyn std::fmt::Display| CallError::BadReply(to, error.to_string());
         match purpose {
-            Purpose::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
+            Purpose::Switch(on) => {
+                Some(Answer::Done(format!("{} is {}", running.text(to), if on { "on" } else { "off" })))
+            }
             Purpose::Lines => match from_bytes::<Page>(bytes) {
                 Ok(page) => Some(Answer::Lines(Ok(page))),
                 Err(error) => failed(running, to, purpose, &unread(&error)),
             },
             Purpose::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
             Purpose::Restart(module) => match from_bytes::<Result<u32, ControlError>>(bytes) {
-                Ok(outcome) => Some(Answer::Restarted(module, outcome.map(|_| ()).map_err(|error| error.to_string()))),
+                Ok(Ok(_)) => Some(Answer::Done(format!("{} is being restarted", running.text(module)))),
+                Ok(Err(error)) => Some(Answer::Done(error.to_string())),
                 Err(error) => failed(running, to, purpose, &unread(&error)),
             },
         }
@@ -179,9 +170,8 @@ fn failed(running: &Running, to: Name, purpose: Purpose, error: &CallError) -> O
         error => error.to_string().replace(&to.to_string(), &asked),
     };
     match purpose {
-        Purpose::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
+        Purpose::Switch(_) | Purpose::Restart(_) => Some(Answer::Done(told)),
         Purpose::Lines => Some(Answer::Lines(Err(told))),
-        Purpose::Restart(module) => Some(Answer::Restarted(module, Err(told))),
         Purpose::Why => None,
     }
 }

@@ -32,7 +32,6 @@ struct About {
 /// Declares the columns from left to right: head, width, rank, content, and the text for help and book.
 macro_rules! columns {
     ($($name:ident: $head:literal, $width:expr, $rank:literal, $content:expr, $text:literal;)+) => {
-        /// A column.
         #[derive(Clone, Copy, PartialEq, Eq, Debug)]
         pub(super) enum Column {
             $($name,)+
@@ -137,7 +136,6 @@ impl Column {
     }
 }
 
-/// A whole number, all its digits.
 fn whole(number: f64) -> String {
     format!("{number:.0}")
 }

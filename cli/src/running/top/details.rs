@@ -2,7 +2,7 @@
 
 use super::columns::{memory, short};
 use super::model::{FlowEnd, Model, Row, Sample};
-use crate::look::summary::print_classes;
+use crate::look::summary::{Bar, bars, print_classes};
 use crate::running::call::usage;
 use crate::running::list::mailbox_lines;
 use crate::terminal::table::{table, time};
@@ -11,7 +11,7 @@ use rohrpost::output::plain;
 use rohrpost::schema::{Description, describe_field, describe_result};
 use rohrpost_config::{Installation, Program};
 use rohrpost_launch::survey::{StreamSurvey, sum};
-use rohrpost_mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
+use rohrpost_mailbox::{Latency, MailboxInfo};
 use std::time::Duration;
 
 /// The page as lines; headings begin without a blank. `describe` returns a module's description.
@@ -167,25 +167,12 @@ fn span(time: Duration) -> String {
 
 /// Bars for the octaves of waiting times, from the shortest to the longest that occurred.
 fn histogram(class: &str, latency: &Latency) -> Vec<String> {
-    const BAR: usize = 40;
-    let octaves: Vec<(usize, u64)> = (0..LATENCY_BUCKETS)
-        .step_by(2)
-        .map(|at| (at, latency.buckets[at..at + 2].iter().map(|count| u64::from(*count)).sum()))
-        .collect();
-    let most = octaves.iter().map(|(_, count)| *count).max().unwrap_or(0);
-    if most == 0 {
-        return Vec::new();
-    }
-    let seen = |octave: &(usize, u64)| octave.1 > 0;
-    let (first, last) = (octaves.iter().position(seen), octaves.iter().rposition(seen));
-    let mut lines = vec![format!("  {class}")];
-    for (at, count) in &octaves[first.unwrap_or(0)..=last.unwrap_or(0)] {
-        // One in a million is visible, too.
-        let bar = (*count as f64 / most as f64 * BAR as f64).ceil() as usize;
-        let below = time(Latency::bucket_start(at + 2));
-        lines.push(format!("    below {below:>7}  {count:>9}  {}", "#".repeat(bar)));
-    }
-    lines
+    let bars = bars(latency);
+    let lines = bars.iter().map(|Bar { to, packages, length, .. }| {
+        format!("    below {:>7}  {packages:>9}  {}", time(*to), "#".repeat(*length))
+    });
+    let head = (!bars.is_empty()).then(|| format!("  {class}"));
+    head.into_iter().chain(lines).collect()
 }
 
 /// Functions and data, as the module itself describes them.

@@ -13,13 +13,14 @@
 use super::app::{App, Prompt, Screen};
 use super::columns::{Column, fit};
 use super::model::{Model, Row};
-use super::palette::Palette;
 use super::text::{head, help};
 use crate::terminal::wrap;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::Style;
+use ratatui::style::{Color, Modifier, Style};
+use rohrpost::common::OutputLevel;
 use rohrpost::output::plain;
+use rohrpost_launch::survey::Standing;
 
 /// Room before a name for the mark of the selected module.
 const MARK: u16 = 2;
@@ -28,7 +29,6 @@ const OUTPUT_MIN: u16 = 4;
 /// A lower terminal shows no output below details and help.
 const SPLIT_MIN: u16 = 20;
 
-/// Everything that a screen shows.
 pub(super) struct ScreenModel<'a> {
     pub(super) model: &'a Model,
     pub(super) app: &'a App,
@@ -41,7 +41,6 @@ pub(super) struct ScreenModel<'a> {
     pub(super) palette: Palette,
 }
 
-/// An output line as it is shown.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct OutputText {
     pub(super) level: rohrpost::common::OutputLevel,
@@ -188,7 +187,6 @@ fn put(to: &mut Buffer, place: Rect, text: &str, style: Style) {
     }
 }
 
-/// The columns of a table of this width.
 pub(super) fn columns(model: &Model, width: u16) -> Vec<(Column, u16)> {
     let longest = model.modules.iter().map(|row| full_name(row).chars().count()).max().unwrap_or(0);
     fit(width.saturating_sub(MARK), longest as u16, model.nodes.len() > 1)
@@ -218,7 +216,6 @@ fn pad(text: &str, width: u16, right: bool) -> String {
     if right { format!("{text:>width$}") } else { format!("{text:<width$}") }
 }
 
-/// A line of the table.
 fn line(to: &mut Buffer, place: Rect, mark: &str, cells: impl Iterator<Item = (String, Style)>) {
     put(to, place, mark, Style::new());
     let mut x = place.x + MARK;
@@ -226,5 +223,72 @@ fn line(to: &mut Buffer, place: Rect, mark: &str, cells: impl Iterator<Item = (S
         let rest = Rect { x, width: place.right().saturating_sub(x), ..place };
         put(to, rest, &text, style);
         x += text.chars().count() as u16 + 1;
+    }
+}
+
+/// With or without colours.
+#[derive(Clone, Copy)]
+pub(super) struct Palette {
+    pub(super) colours: bool,
+}
+
+impl Palette {
+    /// No colours if the user requested that here, or for all programs (<https://no-color.org>).
+    pub(super) fn new(no_color: bool) -> Self {
+        let asked = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        Self { colours: !no_color && !asked }
+    }
+
+    fn coloured(self, colour: Color) -> Style {
+        if self.colours { Style::new().fg(colour) } else { Style::new() }
+    }
+
+    pub(super) fn head(self) -> Style {
+        Style::new().add_modifier(Modifier::BOLD)
+    }
+
+    pub(super) fn rule(self) -> Style {
+        self.coloured(Color::Cyan)
+    }
+
+    pub(super) fn message(self) -> Style {
+        Style::new().add_modifier(Modifier::REVERSED)
+    }
+
+    pub(super) fn selected(self) -> Style {
+        Style::new().add_modifier(Modifier::REVERSED)
+    }
+
+    pub(super) fn column(self, sorted: bool) -> Style {
+        let style = self.coloured(Color::Cyan).add_modifier(Modifier::UNDERLINED);
+        if sorted { style.add_modifier(Modifier::BOLD) } else { style }
+    }
+
+    pub(super) fn cell(self, column: Column, row: &Row) -> Style {
+        match column {
+            Column::State => match row.line.account.state {
+                Standing::On => self.coloured(Color::Green),
+                Standing::Failed | Standing::Busy | Standing::Error => {
+                    self.coloured(Color::Red).add_modifier(Modifier::BOLD)
+                }
+                Standing::Stopped => Style::new(),
+                Standing::Starting | Standing::Off | Standing::Restarting { .. } | Standing::Unreachable => {
+                    self.coloured(Color::Yellow)
+                }
+            },
+            Column::Lost if row.lost_per_s.is_some_and(|lost| lost > 0.0) => {
+                self.coloured(Color::Red).add_modifier(Modifier::BOLD)
+            }
+            Column::Why if row.line.account.error.is_some() => self.coloured(Color::Red),
+            _ => Style::new(),
+        }
+    }
+
+    pub(super) fn level(self, level: OutputLevel) -> Style {
+        match level {
+            OutputLevel::Error => self.coloured(Color::Red).add_modifier(Modifier::BOLD),
+            OutputLevel::Warn => self.coloured(Color::Yellow),
+            _ => Style::new(),
+        }
     }
 }

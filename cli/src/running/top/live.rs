@@ -3,11 +3,9 @@
 use super::app::{App, Screen, ScreenAction};
 use super::calls::{Answer, Calls};
 use super::details;
-use super::draw::{OutputText, ScreenModel, columns};
-use super::model::{Model, Sample};
+use super::draw::{Palette, ScreenModel, columns};
+use super::model::{self, ErrorCauses, Model, NodeSurveys, Sample};
 use super::output::Output;
-use super::palette::Palette;
-use super::sample::{self, ErrorCauses, NodeSurveys};
 use super::terminal::{RawTerminal, keyboard};
 use crate::look::observer::Silence;
 use crate::look::target::Running;
@@ -36,9 +34,6 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
         let typed = keyboard()?;
         live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(LaunchEvent::Stop)))
     };
-    if let Some(calls) = live.calls {
-        calls.close();
-    }
     outcome.map(|()| ExitCode::SUCCESS)
 }
 
@@ -69,7 +64,6 @@ struct Live {
     model: Model,
     /// The last reports of other nodes, in the order of the configuration.
     others: NodeSurveys,
-    /// Since when silent nodes are silent.
     silent_since: HashMap<String, Instant>,
     /// Interfaces of other nodes' modules; each module is asked once.
     described: HashMap<Name, Option<Description>>,
@@ -83,8 +77,8 @@ struct Live {
 impl Live {
     fn new(running: Running, interval: Duration, palette: Palette) -> Result<Self, Failure> {
         let others = not_seen_yet(&running);
-        let seen = in_order(&running, sample::own(&running)?, &others);
-        let now = sample::put_together(&running, seen, None, &ErrorCauses::default());
+        let seen = in_order(&running, model::own(&running)?, &others);
+        let now = model::put_together(&running, seen, None, &ErrorCauses::default());
         let model = Model::new(&running.installation, &running.node_name, &running.shown(), &now, None);
         let output = Output::new(&running.installation);
         let mut live = Self {
@@ -174,8 +168,8 @@ impl Live {
                 silence.silent_s = Some(since.elapsed().as_secs_f64());
             }
         }
-        let seen = in_order(&self.running, sample::own(&self.running)?, &others);
-        Ok(sample::put_together(&self.running, seen, earlier, &self.said))
+        let seen = in_order(&self.running, model::own(&self.running)?, &others);
+        Ok(model::put_together(&self.running, seen, earlier, &self.said))
     }
 
     fn make_model(&mut self) {
@@ -186,18 +180,16 @@ impl Live {
     /// The node may have been launched again, perhaps with another configuration.
     fn find_again(&mut self) {
         let Ok(running) = self.running.again() else { return };
-        let Ok(own) = sample::own(&running) else { return };
+        let Ok(own) = model::own(&running) else { return };
         let others = not_seen_yet(&running);
-        let now = sample::put_together(&running, in_order(&running, own, &others), None, &ErrorCauses::default());
+        let now = model::put_together(&running, in_order(&running, own, &others), None, &ErrorCauses::default());
         if !now.launched {
             return;
         }
         self.others = others;
         self.silent_since.clear();
         self.described.clear();
-        if let Some(calls) = self.calls.take() {
-            calls.close();
-        }
+        self.calls = None;
         (self.running, self.now, self.earlier) = (running, now, None);
         self.said = ErrorCauses::default();
         self.output = Output::new(&self.running.installation);
@@ -234,25 +226,15 @@ impl Live {
 
     fn answer(&mut self, answer: Answer) {
         match answer {
-            Answer::Switched(name, on, outcome) => {
-                let name = self.running.text(name);
-                let done = format!("{name} is {}", if on { "on" } else { "off" });
-                self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
-                self.peek();
-            }
-            Answer::Restarted(name, outcome) => {
-                let done = format!("{} is being restarted", self.running.text(name));
-                self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
+            Answer::Done(message) => {
+                self.app.message = Some(message);
                 self.peek();
             }
             Answer::Snapshot(node, seen) => {
-                match &seen {
-                    Ok(_) => {
-                        self.silent_since.remove(&node);
-                    }
-                    Err(_) => {
-                        self.silent_since.entry(node.clone()).or_insert_with(Instant::now);
-                    }
+                if seen.is_ok() {
+                    self.silent_since.remove(&node);
+                } else {
+                    self.silent_since.entry(node.clone()).or_insert_with(Instant::now);
                 }
                 let at = others(&self.running).position(|other| other == node);
                 if let Some(known) = at.and_then(|at| self.others.get_mut(at)) {
@@ -298,20 +280,19 @@ impl Live {
             self.app.message = self.output.silence.clone();
             return;
         };
-        let mut answers = Vec::new();
-        match action {
-            ScreenAction::Quit => {}
+        let (message, answer) = match action {
+            ScreenAction::Quit => return,
             ScreenAction::Switch(name, on) => {
-                let name_text = self.running.text(name);
-                self.app.message = Some(format!("switching {name_text} {} ...", if on { "on" } else { "off" }));
-                answers.extend(calls.switch(&self.running, name, on));
+                let on_or_off = if on { "on" } else { "off" };
+                let message = format!("switching {} {on_or_off} ...", self.running.text(name));
+                (message, calls.switch(&self.running, name, on))
             }
             ScreenAction::Restart(name) => {
-                self.app.message = Some(format!("restarting {} ...", self.running.text(name)));
-                answers.extend(calls.restart(&self.running, name));
+                (format!("restarting {} ...", self.running.text(name)), calls.restart(&self.running, name))
             }
-        }
-        answers.into_iter().for_each(|answer| self.answer(answer));
+        };
+        self.app.message = Some(message);
+        answer.into_iter().for_each(|answer| self.answer(answer));
     }
 
     fn draw(&mut self, terminal: &mut DefaultTerminal) -> Result<(), Failure> {
@@ -329,7 +310,7 @@ impl Live {
             Screen::Table | Screen::Help => Vec::new(),
         };
         self.app.columns = columns(&self.model, terminal.size()?.width).into_iter().map(|(column, _)| column).collect();
-        let output: Vec<OutputText> = self.output.shown(&self.running.installation, self.app.lines);
+        let output = self.output.shown(&self.running.installation, self.app.lines);
         let view = ScreenModel {
             model: &self.model,
             app: &self.app,

@@ -6,7 +6,7 @@
 //! keys ──▶ App ──▶ ScreenAction ──▶ Calls ──answers──▶ Live ──────┴──▶ ScreenModel ──▶ screen
 //! ```
 //!
-//! `model`, `app`, `columns` and `draw` are pure; `sample`, `calls` and `live` do the input and output.
+//! `Model`, `app`, `columns` and `draw` are pure; `Sample`, `calls` and `live` do the input and output.
 
 mod app;
 mod calls;
@@ -16,19 +16,17 @@ mod draw;
 mod live;
 mod model;
 mod output;
-mod palette;
-mod sample;
 mod terminal;
 #[cfg(test)]
 mod tests;
 mod text;
 
+use crate::look::observer::PATIENCE;
 use crate::look::target::{Running, Target};
 use crate::terminal::{Failure, say};
-use model::Model;
+use model::{ErrorCauses, Model};
 use rohrpost::Name;
 use rohrpost_launch::survey::Scope;
-use sample::ErrorCauses;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -69,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
             return Err("`top` draws on a terminal; for a file or pipe, use `top --once` or `top --json`".into());
         }
-        return live::run(running, interval, palette::Palette::new(arguments.no_color));
+        return live::run(running, interval, draw::Palette::new(arguments.no_color));
     }
     let model = once(&running, interval)?;
     say(if arguments.json { serde_json::to_string(&model)? } else { text::table(&model) });
@@ -79,18 +77,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// The state after one period. A module in error is asked for the cause if no launch knows it.
 fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
     let look = || running.look_at(&running.shown(), Scope::All);
-    let earlier = sample::put_together(running, look()?, None, &ErrorCauses::default());
+    let earlier = model::put_together(running, look()?, None, &ErrorCauses::default());
     std::thread::sleep(interval);
     let seen = look()?;
-    let mut now = sample::put_together(running, seen.clone(), Some(&earlier), &ErrorCauses::default());
+    let mut now = model::put_together(running, seen.clone(), Some(&earlier), &ErrorCauses::default());
     let unexplained: Vec<Name> = now.unexplained().collect();
     if !unexplained.is_empty()
-        && let Ok(mut tool) = running.join(calls::PATIENCE)
+        && let Ok(mut tool) = running.join(PATIENCE)
     {
         let status = |name| Some((name, tool.status(name).ok()?.error));
         let said = unexplained.into_iter().filter_map(status).collect();
-        tool.close();
-        now = sample::put_together(running, seen, Some(&earlier), &said);
+        now = model::put_together(running, seen, Some(&earlier), &said);
     }
     let mut model = Model::new(&running.installation, &running.node_name, &running.shown(), &now, Some(&earlier));
     crate::measure::stream::name_items(running, &mut model.streams);

@@ -1,15 +1,17 @@
-//! The content of `top`: two observations, combined into one table. Pure; `--json` prints it, too.
+//! The content of `top`: two observations, combined into one table. `--json` prints it, too.
 
 use crate::look::observer::Silence;
-use crate::look::summary::{Losses, ModuleLine};
+use crate::look::summary::{Losses, ModuleLine, module_lines};
+use crate::look::target::Running;
 use crate::measure::stream::{StreamView, stream_views};
 use crate::running::list::{MailboxLine, mailbox_lines};
+use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost_config::Installation;
-use rohrpost_launch::survey::{ModuleSurvey, Standing, Survey};
-use rohrpost_mailbox::{FlowInfo, Loss, saturating_sum};
+use rohrpost_launch::survey::{ModuleSurvey, Scope, Standing, Survey};
+use rohrpost_mailbox::{FlowInfo, Loss, SystemClock, monotonic_ns, realtime_ns, saturating_sum};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
 
 /// One observation.
@@ -89,9 +91,7 @@ pub(super) struct Row {
     #[serde(flatten)]
     pub(super) line: ModuleLine,
     pub(super) class: String,
-    /// Packages lost a second.
     pub(super) lost_per_s: Option<f64>,
-    /// Packages sent a second.
     pub(super) sent_per_s: Option<f64>,
     /// Waiting times of the packages that it took in the interval; none without any.
     pub(super) waited_p50_s: Option<f64>,
@@ -178,7 +178,6 @@ impl Model {
         }
     }
 
-    /// The module of this name.
     pub(super) fn row(&self, name: Name) -> Option<&Row> {
         self.modules.iter().find(|row| row.name == name)
     }
@@ -246,4 +245,44 @@ fn cpu_percent(now: &ModuleSurvey, before: &ModuleSurvey, interval: Duration) ->
     let pid = |module: &ModuleSurvey| module.process.as_ref().map(|process| process.pid);
     let ran = now.usage?.cpu.checked_sub(before.usage?.cpu).filter(|_| pid(now) == pid(before))?;
     Some(ran.as_secs_f64() / interval.as_secs_f64() * 100.0)
+}
+
+/// Why modules are in error, as they reported.
+pub(super) type ErrorCauses = HashMap<Name, String>;
+
+/// The reports of some nodes, or why they do not answer.
+pub(super) type NodeSurveys = Vec<Result<Survey, Silence>>;
+
+/// Observes the own node, if it is selected.
+pub(super) fn own(running: &Running) -> Result<NodeSurveys, Failure> {
+    let is_own = |node: &&str| *node == running.node_name;
+    let own: Vec<&str> = running.shown().into_iter().filter(is_own).collect();
+    running.look_at(&own, Scope::All)
+}
+
+/// Merges the nodes' reports; `earlier` is the base of rates.
+pub(super) fn put_together(
+    running: &Running,
+    seen: NodeSurveys,
+    earlier: Option<&Sample>,
+    said: &ErrorCauses,
+) -> Sample {
+    let (mut survey, silent) = running.joined(seen);
+    for module in survey.modules.iter_mut().filter(|module| module.standing() == Standing::Error) {
+        if let Some(error) = said.get(&module.name) {
+            module.error = Some(error.clone());
+        }
+    }
+    let lines = module_lines(&running.installation, &survey, earlier.map(|sample| &sample.survey));
+    let clock = SystemClock::open(&running.node);
+    let record = clock.record();
+    let time = TimeNow {
+        time_ns: clock.now().ns,
+        time_source: record.map_or("local", |record| record.source.name()),
+        time_pace: record.map_or(1.0, |record| record.pace_ppb as f64 / 1e9),
+        time_known: record.is_none_or(|record| record.is_known()),
+        clock_set_by_ns: record.and_then(|record| record.clock_set_by(monotonic_ns(), realtime_ns())),
+    };
+    let launched = running.node.launcher().is_some();
+    Sample { survey, silent, lines, time, launched }
 }

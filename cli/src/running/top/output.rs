@@ -2,9 +2,9 @@
 
 use super::app::LineFilter;
 use super::draw::OutputText;
+use crate::running::log::collector;
 use rohrpost::Name;
-use rohrpost::interface::Interface;
-use rohrpost::interfaces::{CollectorInterface, Page};
+use rohrpost::interfaces::Page;
 use rohrpost::output::OutputLine;
 use rohrpost_builtin::format::Format;
 use rohrpost_config::Installation;
@@ -22,18 +22,14 @@ pub(super) struct Output {
     lines: VecDeque<OutputLine>,
     /// The collector's incarnation that `next` belongs to; none before its first answer.
     incarnation: Option<u32>,
-    /// Number of the next line.
     next: u64,
     /// Why there are no lines.
     pub(super) silence: Option<String>,
 }
 
 impl Output {
-    /// For the installation's collector.
     pub(super) fn new(installation: &Installation) -> Self {
-        let class = installation.classes.id(CollectorInterface::CLASS);
-        let name = class.map(|class| Name::new(installation.system.id, class.0, 0, 0));
-        let collector = name.filter(|name| installation.module(*name).is_some());
+        let collector = collector(installation).filter(|name| installation.module(*name).is_some());
         let silence = collector.is_none().then(|| "the configuration has no module `output.0`".into());
         Self { collector, lines: VecDeque::new(), incarnation: None, next: u64::MAX, silence }
     }

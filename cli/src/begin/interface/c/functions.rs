@@ -1,8 +1,73 @@
-//! Functions of C that write and read a type as postcard.
+//! Types of C as others use them, and functions that write and read them as postcard.
 
+use super::super::blueprint::Plain;
 use super::super::texts::c_comment;
-use super::ctype::{CType, Carried, Member};
+use rohrpost::schema::Type;
 use std::fmt::Write;
+
+/// A type of C.
+#[derive(Clone)]
+pub(super) struct CType {
+    pub(super) name: String,
+    /// Its functions take it by pointer; others by value, with this word in their names.
+    word: Option<&'static str>,
+    /// About how many bytes one has in memory.
+    pub(super) size: u64,
+    /// Whether its values take bytes on the wire.
+    pub(super) takes_bytes: bool,
+}
+
+impl CType {
+    /// A statement that writes a value.
+    pub(super) fn write(&self, place: &str) -> String {
+        match self.word {
+            Some(word) => format!("rp_pack_{word}(to, {place});"),
+            None => format!("{}_write(to, {});", self.name, address(place)),
+        }
+    }
+
+    /// A statement that reads a value.
+    pub(super) fn read(&self, place: &str) -> String {
+        match self.word {
+            Some(word) => format!("{place} = rp_unpack_{word}(from);"),
+            None => format!("{}_read(from, {});", self.name, address(place)),
+        }
+    }
+
+    /// One that has functions by pointer.
+    pub(super) fn structured(name: String, size: u64, takes_bytes: bool) -> Self {
+        Self { name, word: None, size, takes_bytes }
+    }
+
+    /// One that `postcard.h` reads and writes.
+    pub(super) fn plain(plain: &Plain) -> Self {
+        let word = if plain.ty == Type::Unit { "nothing" } else { plain.word };
+        Self { name: plain.c.into(), word: Some(word), size: plain.c_bytes, takes_bytes: plain.ty != Type::Unit }
+    }
+
+    /// As other names have it in them.
+    pub(super) fn short<'a>(&'a self, prefix: &str) -> &'a str {
+        self.word.unwrap_or_else(|| self.name.strip_prefix(prefix).unwrap_or(&self.name))
+    }
+}
+
+fn address(place: &str) -> String {
+    place.strip_prefix('*').map_or_else(|| format!("&{place}"), str::to_owned)
+}
+
+/// One member of a struct: what it is called, its type, and what is said of it.
+pub(super) struct Member {
+    pub(super) name: String,
+    pub(super) ty: CType,
+    pub(super) text: String,
+}
+
+/// A variant: its constant, and what it carries, as which member of the union.
+pub(super) struct Carried {
+    pub(super) constant: String,
+    pub(super) text: String,
+    pub(super) member: Option<(String, CType)>,
+}
 
 /// A struct, with its functions.
 pub(super) fn structure(name: &str, text: &str, members: &[Member], code: &mut String) {
@@ -157,8 +222,8 @@ static inline rp_code {name}_decode({inner} *value, const void *bytes, size_t le
 }}
 
 ",
-            write = ty.write_all(),
-            read = ty.read_all()
+            write = ty.write("*value"),
+            read = ty.read("*value")
         ),
     );
 }

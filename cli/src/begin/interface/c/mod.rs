@@ -2,7 +2,6 @@
 //! the hash and the description's bytes. The header includes nothing but the standard's headers; what all interfaces
 //! need of postcard (`postcard.h`) stands in each, and counts once.
 
-mod ctype;
 mod functions;
 mod types;
 
@@ -10,7 +9,7 @@ use super::blueprint::{Blueprint, Layout};
 use super::names::snake;
 use super::refusal::Refusal;
 use super::texts::{c_comment, c_literal, in_c_comment, of_field};
-use rohrpost::schema::DataKind;
+use rohrpost::schema::{DataKind, Type};
 use types::CTypes;
 
 const POSTCARD: &str = include_str!("postcard.h");
@@ -37,7 +36,7 @@ pub(super) fn write(blueprint: &Blueprint<'_>) -> Result<String, Refusal> {
         }
         let result = format!("{prefix}_{name}_result");
         match &operation.result {
-            Layout::Unit => {}
+            layout if layout.is(&Type::Unit) => {}
             Layout::Result(value, error) => {
                 let result = types.result(&result, value, error, &operation.function.name)?;
                 functions::whole(&result, &mut types.code);

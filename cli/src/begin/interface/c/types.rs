@@ -2,10 +2,9 @@
 
 use super::super::blueprint::{Blueprint, Body, Inside, Layout, TypedField};
 use super::super::names::{Scope, is_plain, last, snake};
-use super::super::refusal::{Refusal, RefusedFor};
+use super::super::refusal::{Refusal, cannot};
 use super::super::texts::{of_field, one_line};
-use super::ctype::{CType, Carried, Member};
-use super::functions;
+use super::functions::{self, CType, Carried, Member};
 use std::collections::HashMap;
 
 /// Bytes that a value may have in C: what somebody puts on a stack.
@@ -28,10 +27,6 @@ pub(super) struct CTypes<'a> {
     scope: Scope,
     known: HashMap<Layout, CType>,
     pub(super) code: String,
-}
-
-fn cannot(place: &str, what: impl Into<String>, instead: &'static str) -> Refusal {
-    RefusedFor::Language { language: "C", what: what.into(), instead }.at(place)
 }
 
 /// A name of a member, one of its scope.
@@ -67,7 +62,7 @@ impl<'a> CTypes<'a> {
         let made = self.make(layout, place)?;
         if made.size > SIZE_MAX {
             let what = format!("a value of {} bytes", made.size);
-            return Err(cannot(place, what, "a list has its elements elsewhere; arrays have them in place"));
+            return Err(cannot("C", place, what, "a list has its elements elsewhere; arrays have them in place"));
         }
         self.known.insert(layout.clone(), made.clone());
         Ok(made)
@@ -75,23 +70,7 @@ impl<'a> CTypes<'a> {
 
     fn make(&mut self, layout: &Layout, place: &str) -> Result<CType, Refusal> {
         Ok(match layout {
-            Layout::Unit => CType::plain("rp_nothing", "nothing", 1),
-            Layout::Bool => CType::plain("bool", "bool", 1),
-            Layout::Whole(false, 8) => CType::plain("uint8_t", "u8", 1),
-            Layout::Whole(false, 16) => CType::plain("uint16_t", "u16", 2),
-            Layout::Whole(false, 32) => CType::plain("uint32_t", "u32", 4),
-            Layout::Whole(false, 64) => CType::plain("uint64_t", "u64", 8),
-            Layout::Whole(false, _) => CType::plain("rp_u128", "u128", 16),
-            Layout::Whole(true, 8) => CType::plain("int8_t", "i8", 1),
-            Layout::Whole(true, 16) => CType::plain("int16_t", "i16", 2),
-            Layout::Whole(true, 32) => CType::plain("int32_t", "i32", 4),
-            Layout::Whole(true, 64) => CType::plain("int64_t", "i64", 8),
-            Layout::Whole(true, _) => CType::plain("rp_i128", "i128", 16),
-            Layout::F32 => CType::plain("float", "f32", 4),
-            Layout::F64 => CType::plain("double", "f64", 8),
-            Layout::Char => CType::plain("uint32_t", "char", 4),
-            Layout::Text => CType::plain("rp_text", "text", 16),
-            Layout::Bytes => CType::plain("rp_bytes", "bytes", 16),
+            Layout::Plain(plain) => CType::plain(plain),
             Layout::Option(some) => {
                 let some = self.of(some, place)?;
                 let name = self.around("option", &some);
@@ -207,7 +186,7 @@ impl<'a> CTypes<'a> {
                 Ok(self.structure(name, named.text, &members))
             }
             Body::Enum(variants) if variants.is_empty() => {
-                Err(cannot(place, "an enum without variants", "give it one"))
+                Err(cannot("C", place, "an enum without variants", "give it one"))
             }
             Body::Enum(variants) => {
                 // What variants carry stands before the enum.

@@ -4,14 +4,82 @@ mod ask;
 
 pub(super) use ask::ask;
 
-use super::finding::{Finding, Grade};
-use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
+use super::finding::{Check, Finding};
 use super::machine::{Machine, Needs};
+use std::net::IpAddr;
 
 /// The receive buffer that a router requests, for datagrams that arrive while it does not read.
 const RECEIVE_BYTES: u64 = 8 << 20;
 /// With a smaller buffer, a burst of one large package from each of a few nodes is lost.
 const RECEIVE_BYTES_LEAST: u64 = 1 << 20;
+
+/// A node's network in its configuration and on this computer.
+#[derive(Clone, Debug)]
+pub(super) struct LanView {
+    pub(super) node: String,
+    pub(super) address: IpAddr,
+    pub(super) mtu: u16,
+    /// Whether this computer has the address.
+    pub(super) is_here: bool,
+    /// This computer's addresses, with their devices.
+    pub(super) addresses: Vec<(String, IpAddr)>,
+    /// The ports for packages, for time and, without time slots, for packages that are not real time.
+    pub(super) ports: Vec<Port>,
+    /// A router of this node runs here.
+    pub(super) runs: bool,
+    pub(super) stamps: Stamps,
+    pub(super) peers: Vec<PeerNode>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Port {
+    pub(super) what: &'static str,
+    pub(super) number: u16,
+    pub(super) state: PortState,
+}
+
+/// Whether a port is free.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum PortState {
+    Free,
+    InUse,
+    /// Unknown, since this computer does not have the address.
+    Unknown,
+    Refused(String),
+}
+
+/// Which kernel time stamps datagrams get.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Stamps {
+    Both,
+    /// Only on reception, not on transmission.
+    NoSent,
+    None(String),
+    /// There was no peer to send to.
+    Unknown,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct PeerNode {
+    pub(super) name: String,
+    pub(super) address: IpAddr,
+    /// Path MTU, as far as this computer knows.
+    pub(super) mtu: Option<u32>,
+    pub(super) reach: Reach,
+}
+
+/// A peer's reaction to a probe.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Reach {
+    /// The computer answers, but no program has the port.
+    NoRouter,
+    /// The computer is there. If its router has the port, it does not answer an empty datagram.
+    Neighbour,
+    /// No reaction.
+    Silent,
+    /// The system cannot send there.
+    NoWay(String),
+}
 
 pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     let Some(lan) = &machine.asked.lan else { return Vec::new() };
@@ -31,19 +99,16 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 }
 
 fn address(lan: &LanView, from: &str) -> Finding {
-    let (what, why) = ("node address", "other nodes send to it, and accept datagrams only from it");
+    let check = Check("node address", "other nodes send to it, and accept datagrams only from it");
     if lan.is_here {
         let device = lan.addresses.iter().find(|(_, address)| *address == lan.address);
         let device = device.map_or(String::new(), |(device, _)| format!(", device {device}"));
-        return Finding::ok(what, format!("{}{device}", lan.address), why);
+        return check.ok(format!("{}{device}", lan.address));
     }
     let others: Vec<String> = lan.addresses.iter().map(|(device, address)| format!("{address} ({device})")).collect();
     let others = if others.is_empty() { "none".into() } else { others.join(", ") };
-    Finding::not(
-        Grade::Bad,
-        what,
+    check.bad(
         format!("{} is not one of this computer, which has {others}", lan.address),
-        why,
         format!(
             "run it on node {}'s own computer, or `--node` with the name of this one; or correct `address` in {from}; \
              or give this computer the address: sudo ip address add {}/24 dev DEVICE",
@@ -53,79 +118,63 @@ fn address(lan: &LanView, from: &str) -> Finding {
 }
 
 fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
-    let what = port.what;
-    let why = "the node's router takes datagrams there; a firewall must let them in from all nodes";
+    let check = Check(port.what, "the node's router takes datagrams there; a firewall must let them in from all nodes");
     let number = port.number;
     match &port.state {
-        PortState::Free => Finding::ok(what, format!("UDP {number}, free"), why),
-        PortState::InUse if lan.runs => Finding::ok(what, format!("UDP {number}, this node's router has it"), why),
-        PortState::InUse => Finding::not(
-            Grade::Bad,
-            what,
+        PortState::Free => check.ok(format!("UDP {number}, free")),
+        PortState::InUse if lan.runs => check.ok(format!("UDP {number}, this node's router has it")),
+        PortState::InUse => check.bad(
             format!("UDP {number}, another program has it"),
-            why,
             format!(
                 "`ss -ulpn sport = {number}` names the program: stop it, or write another `port` into [network] of \
                  {from}, the same on all nodes"
             ),
         ),
-        PortState::Unknown => Finding::not(
-            Grade::Warn,
-            what,
-            format!("UDP {number}, not tried"),
-            why,
-            "fix the node's address first, then check again",
-        ),
-        PortState::Refused(error) => Finding::not(
-            Grade::Bad,
-            what,
-            format!("UDP {number}, refused: {error}"),
-            why,
-            format!("write another `port` into [network] of {from}"),
-        ),
+        PortState::Unknown => {
+            check.warn(format!("UDP {number}, not tried"), "fix the node's address first, then check again")
+        }
+        PortState::Refused(error) => check
+            .bad(format!("UDP {number}, refused: {error}"), format!("write another `port` into [network] of {from}")),
     }
 }
 
 fn buffers(machine: &Machine) -> Option<Finding> {
-    let (what, why) = (
+    let check = Check(
         "socket buffers",
         "they hold datagrams that arrive while the router's thread waits for a core; without room, datagrams are lost",
     );
     let limit = machine.number("/proc/sys/net/core/rmem_max")?;
     let is = format!("at most {} KiB without root rights", limit >> 10);
     Some(if limit >= RECEIVE_BYTES_LEAST {
-        Finding::ok(what, is, why)
+        check.ok(is)
     } else {
-        Finding::not(Grade::Warn, what, is, why, format!("sudo sysctl -w net.core.rmem_max={RECEIVE_BYTES}"))
+        check.warn(is, format!("sudo sysctl -w net.core.rmem_max={RECEIVE_BYTES}"))
     })
 }
 
 fn stamps(lan: &LanView) -> Option<Finding> {
-    let (what, why) = (
+    let check = Check(
         "time stamps",
         "the kernel's time stamps of sending and reception compare the nodes' clocks; else a thread's less exact ones",
     );
     let fix = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and \
         software-receive";
     Some(match &lan.stamps {
-        Stamps::Both => Finding::ok(what, "sending and receiving", why),
-        Stamps::NoSent => Finding::not(Grade::Warn, what, "receiving only", why, fix),
-        Stamps::None(error) => Finding::not(Grade::Warn, what, format!("none ({error})"), why, fix),
+        Stamps::Both => check.ok("sending and receiving"),
+        Stamps::NoSent => check.warn("receiving only", fix),
+        Stamps::None(error) => check.warn(format!("none ({error})"), fix),
         Stamps::Unknown => return None,
     })
 }
 
 fn reach(peer: &PeerNode, lan: &LanView) -> Finding {
-    let (what, why) = ("peer", "each node's router sends to each other one");
+    let check = Check("peer", "each node's router sends to each other one");
     let node = format!("{} at {}", peer.name, peer.address);
     match &peer.reach {
-        Reach::NoRouter => Finding::ok(what, format!("{node}: is there; no router runs on it yet"), why),
-        Reach::Neighbour => Finding::ok(what, format!("{node}: is there"), why),
-        Reach::Silent => Finding::not(
-            Grade::Warn,
-            what,
+        Reach::NoRouter => check.ok(format!("{node}: is there; no router runs on it yet")),
+        Reach::Neighbour => check.ok(format!("{node}: is there")),
+        Reach::Silent => check.warn(
             format!("{node}: does not answer"),
-            why,
             format!(
                 "switch it on; look after cables and `ping {}`; a firewall must let UDP {} through (there: \
                  `sudo nft list ruleset`)",
@@ -133,28 +182,22 @@ fn reach(peer: &PeerNode, lan: &LanView) -> Finding {
                 lan.ports.iter().map(|port| port.number.to_string()).collect::<Vec<_>>().join(", ")
             ),
         ),
-        Reach::NoWay(error) => Finding::not(
-            Grade::Bad,
-            what,
+        Reach::NoWay(error) => check.bad(
             format!("{node}: {error}"),
-            why,
             format!("an address in the same network as {}, or a route: `ip route get {}`", lan.address, peer.address),
         ),
     }
 }
 
 fn mtu(peer: &PeerNode, lan: &LanView, from: &str) -> Option<Finding> {
-    let (what, why) = ("packet size", "a datagram larger than the path's MTU is lost, or refused by the kernel");
+    let check = Check("packet size", "a datagram larger than the path's MTU is lost, or refused by the kernel");
     // Where nobody answers, the kernel knows of another way at most, such as that to the Internet.
     let way = peer.mtu.filter(|_| matches!(peer.reach, Reach::NoRouter | Reach::Neighbour))?;
     Some(if way >= lan.mtu.into() {
-        Finding::ok(what, format!("{} B of the {way} B that go to {}", lan.mtu, peer.name), why)
+        check.ok(format!("{} B of the {way} B that go to {}", lan.mtu, peer.name))
     } else {
-        Finding::not(
-            Grade::Bad,
-            what,
+        check.bad(
             format!("{} B, and only {way} B go to {}", lan.mtu, peer.name),
-            why,
             format!("write `mtu = {way}` into [network] of {from}; or sudo ip link set dev DEVICE mtu {}", lan.mtu),
         )
     })

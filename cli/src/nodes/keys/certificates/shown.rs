@@ -1,6 +1,7 @@
 //! The existing certificates and their remaining validity, as text.
 
 use super::{AUTHORITY, DAY, HolderState, files, folder, holders, is_pair, state};
+use crate::terminal::units::counted;
 use rcgen::date_time_ymd;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::realtime_ns;
@@ -84,7 +85,7 @@ fn lasts(file: &Path, renews: &str) -> String {
 
 fn text(until_s: u64, days: u64, renews: &str) -> String {
     let until = date_time_ymd(1970, 1, 1) + Duration::from_secs(until_s);
-    let left = if days == 1 { "1 day".into() } else { format!("{days} days") };
+    let left = counted(days, "day");
     let warning = format!("; renew it soon: `rohrpost {renews}` makes new ones");
     let warning = if days < SOON_DAYS { warning } else { String::new() };
     format!(", valid for {left}, until {}{warning}", until.date())

@@ -1,9 +1,8 @@
 //! The demo's robot as two observations, a second apart, with simple numbers.
 
 use super::super::details;
-use super::super::draw::{OutputText, ScreenModel};
+use super::super::draw::{OutputText, Palette, ScreenModel};
 use super::super::model::{Model, Sample, TimeNow};
-use super::super::palette::Palette;
 use super::super::{app::App, output};
 use crate::look::summary::{ModuleLine, module_lines};
 use ratatui::Terminal;

@@ -1,5 +1,5 @@
-//! `rohrpost tcp-router` and `rohrpost tcp-client`: carry packages beyond the LAN. Launch starts them as `[tcp]`
-//! requires.
+//! `rohrpost router`, `rohrpost tcp-router` and `rohrpost tcp-client`: carry packages between nodes, and beyond the
+//! LAN. Launch starts them as the configuration requires.
 
 use crate::terminal::Failure;
 use rohrpost::Start;
@@ -30,4 +30,19 @@ pub(super) fn serve(arguments: Arguments) -> Result<ExitCode, Failure> {
 pub(super) fn join(arguments: Arguments) -> Result<ExitCode, Failure> {
     let start = Start::from_arguments(arguments.arguments.into_iter());
     Ok(exit(start.and_then(rohrpost_router_daemon::run_tcp_client)))
+}
+
+#[derive(clap::Args)]
+#[command(after_help = "Example, on the first node of robot.toml: rohrpost router --config robot.toml --name router.0
+Launch starts it on each node of a system with several nodes; start it by hand only if you start modules by hand.")]
+pub(super) struct LanArguments {
+    /// The arguments of every module: --config FILE --name router.I [--off]; I is the place of its node in the
+    /// configuration, from 0.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
+}
+
+pub(super) fn connect(arguments: LanArguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter());
+    Ok(exit(start.and_then(rohrpost_router_daemon::run_router)))
 }

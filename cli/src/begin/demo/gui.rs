@@ -1,18 +1,40 @@
-//! How far the build of the GUI bridge is that `cargo demo` runs beside the demo.
+//! The GUI of a demo: the drawing that it writes, and how far its build is that `cargo demo` runs beside the demo.
 
 use super::copy::is_gui;
+use crate::terminal::say;
 use rohrpost::output::plain;
+use rohrpost_config::{GUI, Installation};
 use rohrpost_launch::Launch;
 use rohrpost_launch::launcher::Phase;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// The file that the GUI will write, if it writes one.
+pub(crate) fn drawing(installation: &Installation) -> Option<PathBuf> {
+    let class = installation.classes.id(GUI)?;
+    let gui = installation.modules.iter().find(|module| module.name.class() == class)?;
+    let file = gui.settings.get("file").filter(|_| !gui.settings.contains_key("viewer"))?;
+    Some(installation.resolve(file.as_str()?))
+}
+
+/// Prints where the drawing is, if it was written since.
+pub(crate) fn drawn(drawing: Option<PathBuf>, begun: SystemTime) {
+    let is_new = |path: &PathBuf| path.metadata().and_then(|file| file.modified()).is_ok_and(|at| at >= begun);
+    if let Some(path) = drawing.filter(is_new) {
+        let path = path.canonicalize().unwrap_or(path);
+        let here = std::env::current_dir().unwrap_or_default();
+        let path = path.strip_prefix(here).unwrap_or(&path).display();
+        say(format_args!("drawing: {path} (to open it: rerun {path})"));
+    }
+}
 
 /// So much of the file's end is read; its last line is far shorter.
 const END_BYTES: u64 = 4096;
 
 /// What to say of the build: the last line of its file. None when the GUI has joined the robot, or no build runs.
-pub(super) fn progress(file: Option<&Path>, launch: &Launch) -> Option<String> {
+pub(super) fn build_progress(file: Option<&Path>, launch: &Launch) -> Option<String> {
     let file = file.filter(|_| launch.phases().any(|(name, phase)| is_gui(name) && phase == Phase::LeftOut))?;
     let last = last_line(file).unwrap_or_else(|error| format!("nobody knows how far it is: {error}"));
     Some(format!("GUI bridge: {} ({})", plain::line(&last), file.display()))
