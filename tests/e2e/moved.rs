@@ -17,8 +17,7 @@ struct Mapped {
 impl Mapped {
     /// Runs the demo with its mapper on a node; none where there are no namespaces.
     fn on(place: &Place, text: &str) -> Option<Self> {
-        let config = place.path("nodes.toml");
-        std::fs::write(&config, text).unwrap();
+        let config = place.write("nodes.toml", text);
         let config = config.to_str().unwrap();
         place.say(&["check", config]).ok();
         let said = place.say(&["demo", "--nodes", "3", "--config", config, "--seconds", "10", "--no-gui", "--quiet"]);

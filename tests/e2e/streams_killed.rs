@@ -1,7 +1,7 @@
 //! The demo's simulation is killed again and again: readers of its streams go on by themselves, and each accounts for
 //! all that was written.
 
-use crate::harness::{PATIENCE, Place, Robot, signal, wait};
+use crate::harness::{PATIENCE, Place, Robot, signal, times, until, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost::Name;
@@ -19,12 +19,6 @@ const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo.toml");
 const MAP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
 /// The stream of pictures keeps one record less: a reader that comes after so many has lost some.
 const RECORDS_BETWEEN_KILLS: usize = 9;
-
-/// How often the simulation is killed: for a long run,
-/// `ROHRPOST_KILLS=100 cargo test -p rohrpost-cli --test e2e streams_killed`.
-fn kills() -> u32 {
-    std::env::var("ROHRPOST_KILLS").ok().map_or(10, |kills| kills.parse().unwrap())
-}
 
 /// The demo without its GUI, with a simulation that is never given up. The mapper begins before the simulation: so it
 /// accounts for each record that is ever written.
@@ -44,8 +38,7 @@ fn demo(place: &Place) -> PathBuf {
         within = "50 ms"
     };
     sim.insert("restart".into(), restart.into());
-    let file = place.path("demo.toml");
-    std::fs::write(&file, toml::to_string(&demo).unwrap()).unwrap();
+    let file = place.write("demo.toml", toml::to_string(&demo).unwrap());
     file
 }
 
@@ -227,7 +220,7 @@ fn mapper_accounts(robot: &Robot) -> u64 {
 /// A tool that reads odometry from its first record on.
 fn start_tool(place: &Place) -> Running {
     let words = ["stream", "read", "odometry.0", "odometry", "--from", "0", "--next", "1000000", "--json"];
-    Running::start(place.command(&words))
+    place.start(&words)
 }
 
 /// Ends the tool once it has come to the end; what it printed is what this test has seen.
@@ -276,23 +269,23 @@ fn check_value_at_a_time(place: &Place, odometry: &mut ObservedStream, follower:
 fn a_simulation_that_is_killed_again_and_again_loses_no_reader_and_each_record_is_accounted_for() {
     let place = Place::new();
     let config = demo(&place);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (mut launch, robot) = place.launched_from(&config);
     let participant = Participant::join(&robot.node, Name::NONE).unwrap();
     let mut readers = Readers::new(&robot, &participant);
     let [mut holder, mut keeper] = [(); 2].map(|()| participant.stream_reader(readers.streams[0].id).unwrap());
     let mut tool = start_tool(&place);
     // Those of this test; the mapper looks at scans and odometry, the tool at odometry.
     let seats = [4, 2, 3];
-    wait("the tool has its seat", || (readers.seats(&robot) == seats).then_some(()));
+    until("the tool has its seat", || readers.seats(&robot) == seats);
     let others = || ["mapper.0", "pilot.0", "output.0"].map(|module| robot.pid(module));
     let pids = others();
     readers.read_next_incarnation(1);
     // Held until the end, the other over one kill each.
     let kept = keeper.newest().unwrap().unwrap();
     readers.streams[0].check(&kept);
-    for kill in 1..=kills() {
+    // For a long run: `ROHRPOST_KILLS=100 cargo test -p rohrpost-cli --test e2e streams_killed`.
+    let kills = times("ROHRPOST_KILLS", 10);
+    for kill in 1..=kills {
         let held = holder.newest().unwrap().unwrap();
         readers.streams[0].check(&held);
         let sim = robot.pid("motor.0");
@@ -308,9 +301,9 @@ fn a_simulation_that_is_killed_again_and_again_loses_no_reader_and_each_record_i
     }
     check_value_at_a_time(&place, &mut readers.streams[2], &mut readers.followers[2]);
     place.say(&["stop", "motor.0"]).ok();
-    readers.read_rest(&robot, kills());
+    readers.read_rest(&robot, kills);
     let [_, scans, odometry] = readers.streams.each_ref().map(|stream| stream.info(&robot).written);
-    wait("the mapper has come to all scans", || (mapper_accounts(&robot) >= scans).then_some(()));
+    until("the mapper has come to all scans", || mapper_accounts(&robot) >= scans);
     assert_eq!(mapper_accounts(&robot), scans, "read and lost are what was written");
     check_tool(tool, &readers.streams[2], odometry);
     drop(kept);
