@@ -1,7 +1,7 @@
 //! `launch --all`: all nodes of a configuration on this computer, in network namespaces.
 
-use crate::harness::{OUTPUT, Place, lacks_namespaces, probe, runs, until};
-use crate::network::{NETWORK, at, nodes};
+use crate::harness::{OUTPUT, Place, assert_has, lacks_namespaces, probe, runs, until};
+use crate::network::{NETWORK, at, launched_all, nodes};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost_testbed::report::skipped;
@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::os::unix::fs::chown;
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 fn two() -> String {
@@ -23,23 +23,10 @@ fn configured(place: &Place, settings: &str, keys: &str) -> PathBuf {
     place.config_of("test", &two(), &[&modules[0], &modules[1]])
 }
 
-fn all(place: &Place, config: &Path, further: &[&str]) -> Running {
-    place.start(&[&["launch", config.to_str().unwrap(), "--all"], further].concat())
-}
-
-/// Whether the system allows namespaces here.
-fn is_allowed() -> bool {
-    let place = Place::new();
-    let config = configured(&place, "exit_at_start = 3", "restart = \"never\"");
-    let told = all(&place, &config, &[]).said().err;
-    !lacks_namespaces(&told)
-}
-
-/// Waits until all modules of both nodes are on.
-fn wait_until_both_run(launch: &mut Running) {
-    for node in ["base", "arm"] {
-        launch.wait_for(&format!("│ node {node} of test runs: 2 modules"));
-    }
+/// Both nodes, with these further words for launch.
+fn both(place: &Place, words: &[&str]) -> Option<(Running, PathBuf)> {
+    let config = configured(place, "", "");
+    Some((launched_all(place, &config, &["base", "arm"], words)?, config))
 }
 
 /// Processes that a process has started, recursively.
@@ -55,13 +42,9 @@ fn devices() -> BTreeSet<std::ffi::OsString> {
 
 #[test]
 fn nodes_start_talk_and_are_stopped() {
-    if !is_allowed() {
-        return;
-    }
     let (place, before) = (Place::new(), devices());
-    let config = configured(&place, "", "");
-    let mut launch = all(&place, &config, &[]);
-    wait_until_both_run(&mut launch);
+    let Some((mut launch, config)) = both(&place, &[]) else { return };
+    assert_has(&launch.out(), ["│ node base of test runs: 2 modules", "│ node arm of test runs: 2 modules"]);
     assert!(launch.out().starts_with("security = \"none\": packages between nodes are neither sealed nor signed"));
     assert_eq!(place.say_at(&config, "base", &["call", "probe.1", "count", "1"]).ok(), "1\n");
     assert_eq!(place.say_at(&config, "arm", &["call", "probe.0", "count", "2"]).ok(), "1\n");
@@ -79,13 +62,8 @@ fn nodes_start_talk_and_are_stopped() {
 
 #[test]
 fn nothing_is_left_when_it_is_killed() {
-    if !is_allowed() {
-        return;
-    }
     let place = Place::new();
-    let config = configured(&place, "", "");
-    let mut launch = all(&place, &config, &[]);
-    wait_until_both_run(&mut launch);
+    let Some((mut launch, _config)) = both(&place, &[]) else { return };
     let processes = below(launch.pid());
     assert_eq!(processes.len(), 6);
     launch.kill();
@@ -95,12 +73,13 @@ fn nothing_is_left_when_it_is_killed() {
 
 #[test]
 fn a_node_that_does_not_start_ends_them_all() {
-    if !is_allowed() {
-        return;
-    }
     let place = Place::new();
     let config = configured(&place, "exit_at_start = 3", "restart = \"never\"");
-    let told = all(&place, &config, &[]).said().fails();
+    let said = place.say(&["launch", config.to_str().unwrap(), "--all"]);
+    if lacks_namespaces(&said.err) {
+        return;
+    }
+    let told = said.fails();
     assert!(told.contains("arm │ module probe.1 did not become ready"), "{told}");
     assert!(told.contains("node arm did not start: exit status: 1"), "{told}");
     place.assert_empty();
@@ -109,13 +88,8 @@ fn a_node_that_does_not_start_ends_them_all() {
 /// A killed node is reported, and the others go on.
 #[test]
 fn a_node_that_ends_leaves_the_others_alone() {
-    if !is_allowed() {
-        return;
-    }
     let place = Place::new();
-    let config = configured(&place, "", "");
-    let mut launch = all(&place, &config, &[]);
-    wait_until_both_run(&mut launch);
+    let Some((mut launch, config)) = both(&place, &[]) else { return };
     let arm = place.robot_at(&config, "arm").node.launcher().unwrap();
     crate::harness::signal(arm, Signal::SIGKILL);
     until("its end is told", || launch.err().contains("node arm ended: signal: 9"));
@@ -130,14 +104,9 @@ fn a_node_that_ends_leaves_the_others_alone() {
 
 #[test]
 fn calls_are_counted_once_over_a_bad_network() {
-    if !is_allowed() {
-        return;
-    }
     let place = Place::new();
-    let config = configured(&place, "", "");
     let bad = "loss=10%,delay=1ms,jitter=500us,duplicate=5%,reorder=10%,seed=3";
-    let mut launch = all(&place, &config, &["--impair", bad]);
-    wait_until_both_run(&mut launch);
+    let Some((mut launch, config)) = both(&place, &["--impair", bad]) else { return };
     let mut expected = Vec::new();
     for number in 1..=12 {
         let said = place.say_at(&config, "base", &["call", "probe.1", "count", &number.to_string()]);

@@ -1,6 +1,6 @@
 //! `rohrpost bench local`. Its sentence for other computers is tested beside its code, its measurements in `benches`.
 
-use crate::harness::{OUTPUT, Place, probe};
+use crate::harness::{OUTPUT, Place, json_lines, probe};
 use rohrpost_testbed::report::has_two_processors;
 use serde_json::Value;
 
@@ -14,7 +14,7 @@ fn the_self_test_has_all_figures() {
     }
     let place = Place::new();
     let said = place.say(&["bench", "local", "--json"]);
-    let lines: Vec<Value> = said.ok().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines = json_lines(&said.ok());
     assert_eq!(lines.first().unwrap()["case"], "environment");
     assert_eq!(lines.last().unwrap()["case"], "environment-after");
     for (case, floor) in CASES {

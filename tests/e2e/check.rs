@@ -227,7 +227,7 @@ fn time_slots_are_drawn_and_the_worst_of_each_flow_is_said() {
 fn a_deadline_that_slots_cannot_keep_is_refused_with_what_would() {
     let place = Place::new();
     let demo = |length: &str| include_str!("../../config/demo-tdma.toml").replacen("\"1.2 ms\"", length, 1);
-    std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map"), place.path("building.map")).unwrap();
+    place.copy("config/building.map");
     place.write("short.toml", demo("\"450 us\""));
     let told = place.say(&["check", "short.toml"]).fails();
     // Each flow asks for what it needs; the last one waits for all the others.

@@ -1,6 +1,6 @@
 //! Exact replay: the demo's modules repeat what they did on a loaded and disturbed node, and whatever differs is found.
 
-use crate::harness::{Place, RECORDED_CLASSES, Robot, halt, signal, times, until};
+use crate::harness::{Place, RECORDED_CLASSES, Robot, halt, json_lines, signal, times, until};
 use crate::load::Load;
 use crate::process::{Running, Said};
 use crate::recordings::messages;
@@ -54,11 +54,9 @@ leave-free = "0 B"
 flush = "20 ms"
 "#;
 
-const BUILDING: &str = include_str!("../../config/building.map");
-
 pub(crate) fn launched(place: &Place, modules: &str) -> (Running, Robot) {
     let config = place.config(&[RECORDED_CLASSES, LOGD, modules]);
-    place.write("building.map", BUILDING);
+    place.copy("config/building.map");
     place.write("vision.map", "far");
     place.launched_from(&config)
 }
@@ -85,7 +83,7 @@ pub(crate) fn recording(place: &Place, number: u32) -> PathBuf {
 /// What each run of each module came to.
 pub(crate) fn replayed(place: &Place, file: &Path, modules: &[&str]) -> Vec<Value> {
     let said = replay(place, file, modules, &[]);
-    said.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    json_lines(&said.out)
 }
 
 fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str)]) -> Said {

@@ -1,8 +1,8 @@
 //! Nodes that only the TCP router reaches, such as a robot's laptop: all nodes of the file in namespaces of their own,
 //! `base` and `arm` on a LAN, `far` on a link of its own to `base`.
 
-use crate::harness::{PATIENCE, Place, head, lacks_namespaces, probe, until, wait};
-use crate::network::nodes;
+use crate::harness::{PATIENCE, Place, head, probe, until, wait};
+use crate::network::{launched_all, nodes};
 use crate::process::{Running, Said};
 use crate::systems::CLASSES;
 use rohrpost_mailbox::{SystemClock, monotonic_ns};
@@ -40,16 +40,8 @@ impl Field {
         if security == SEALED {
             place.say(&["keys", "new", config.to_str().unwrap()]).ok();
         }
-        let mut launch = place.start(&["launch", config.to_str().unwrap(), "--all"]);
-        let is_there = wait("all nodes run", || {
-            if launch.ended().is_some() {
-                assert!(lacks_namespaces(&launch.err()), "{}\n{}", launch.out(), launch.err());
-                return Some(false);
-            }
-            let runs = |node: &&str| launch.out().contains(&format!("node {node} of test runs"));
-            nodes.iter().all(runs).then_some(true)
-        });
-        is_there.then(|| Self { place, config, launch, nodes: nodes.to_vec() })
+        let launch = launched_all(&place, &config, nodes, &[])?;
+        Some(Self { place, config, launch, nodes: nodes.to_vec() })
     }
 
     fn says(&self, node: &str, arguments: &[&str]) -> Said {

@@ -12,7 +12,9 @@ use rohrpost_modules::runtime::{Start, run_started, tell_exit};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use rohrpost_testbed::report::skipped;
 pub(crate) use rohrpost_testbed::report::{PATIENCE, until, wait};
+use serde_json::Value;
 use std::fmt::Debug;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::str::FromStr;
@@ -46,6 +48,11 @@ pub(crate) fn patient<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
         ["param", _, ..] if !is_said => [&arguments[..2], &PATIENT, &arguments[2..]].concat(),
         _ => arguments.to_vec(),
     }
+}
+
+/// Objects that a tool has printed, one a line.
+pub(crate) fn json_lines(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"))).collect()
 }
 
 /// All these words are in a text.
@@ -129,7 +136,7 @@ id = 24
 
 /// A simulated robot with streams, one of them of pictures; first of a configuration, since classes are before modules.
 pub(crate) fn simulated() -> String {
-    let map = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
+    let map = repository("config/building.map");
     format!(
         "{RECORDED_CLASSES}[classes.camera]\nid = 112\n[[module]]\nname = \"motor.0\"\nbuiltin = \"sim\"\n\
          aliases = [\"odometry.0\", \"laser.0\", \"camera.0\"]\nsettings = {{ map = {map:?}, camera-rate-hz = 2 }}\n\
@@ -209,6 +216,15 @@ impl Place {
         (place, launch, robot)
     }
 
+    /// The same, without waiting until they are.
+    pub(crate) fn begun(modules: &[&str]) -> (Self, Running, Robot) {
+        let place = Self::new();
+        let config = place.config(modules);
+        let mut launch = place.launch(&config);
+        let robot = place.robot(&config, "main", &mut launch);
+        (place, launch, robot)
+    }
+
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -218,6 +234,19 @@ impl Place {
         let file = self.path(name);
         std::fs::write(&file, content).unwrap();
         file
+    }
+
+    /// Writes a program; where it is.
+    pub(crate) fn program(&self, name: &str, code: impl AsRef<[u8]>) -> PathBuf {
+        let file = self.write(name, code);
+        std::fs::set_permissions(&file, PermissionsExt::from_mode(0o755)).unwrap();
+        file
+    }
+
+    /// Copies a file of the repository here, under its own name.
+    pub(crate) fn copy(&self, file: &str) {
+        let name = Path::new(file).file_name().unwrap().to_str().unwrap();
+        std::fs::copy(repository(file), self.path(name)).unwrap();
     }
 
     /// Directory of nodes.

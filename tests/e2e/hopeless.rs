@@ -2,12 +2,10 @@
 
 use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, probe};
 use nix::sys::signal::Signal;
-use std::os::unix::fs::PermissionsExt;
 
 /// A module of a program in Python that never becomes one.
 fn python(place: &Place, code: &str, keys: &str) -> String {
-    let path = place.write("hand.py", format!("#!/usr/bin/env python3\n{code}\n"));
-    std::fs::set_permissions(&path, PermissionsExt::from_mode(0o755)).unwrap();
+    place.program("hand.py", format!("#!/usr/bin/env python3\n{code}\n"));
     format!("[[module]]\nname = \"pilot.0\"\nprogram = \"./hand.py\"\n{keys}\n")
 }
 

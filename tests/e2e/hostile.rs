@@ -35,7 +35,7 @@ impl Field {
         let lab = lab(NODES, "hostile programs beside the demo")?;
         let place = Place::new();
         let config = place.write("robot.toml", robot());
-        place.write("building.map", include_str!("../../config/building.map"));
+        place.copy("config/building.map");
         // The teammate's certificate is signed by the same authority, for a node of another system.
         let teammate = robot().replace("id = 1\n", "id = 2\n").replace("name = \"robot\"", "name = \"mate\"");
         let teammate = teammate.replace("server = \"base\"\n", "").replace("nodes.desk", "nodes.evil");

@@ -2,7 +2,9 @@
 //! alone. The robot is on `base`; its file knows the laptop as a node that the TCP router reaches, and nothing is
 //! launched there.
 
-use crate::harness::{Place, assert_has, halt, head, lab, program, python, repository, signal, until, wait};
+use crate::harness::{
+    Place, assert_has, halt, head, json_lines, lab, program, python, repository, signal, until, wait,
+};
 use crate::network::Network;
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
@@ -220,14 +222,14 @@ fn what_the_tools_print_python_prints_on_the_laptop() {
     let got = scene.prints(&["call", "odometry.0.get.odometry"]).ok();
     assert!(got.starts_with("{pose: {x_m: "), "{got}");
     let data = scene.prints(&["echo", "odometry.0.odometry", "--count", "2", "--json"]).ok();
-    let data: Vec<serde_json::Value> = data.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let data = json_lines(&data);
     let numbers = data.iter().map(|data| data["sequence"].as_u64());
     assert_eq!(numbers.collect::<Vec<_>>(), [Some(0), Some(1)], "{data:?}");
     scene.prints(&["time"]).ok_with([" s since 1970, off by at most "]);
     let picture = || scene.printing(&["picture", "camera.0", "it.png"]);
     a_picture_comes_as_the_camera_took_it(&scene, picture, "it.png");
     let records = scene.prints(&["stream", "read", "camera.0", "image", "--next", "2", "--json", "--bytes", "3"]).ok();
-    let records: Vec<serde_json::Value> = records.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let records = json_lines(&records);
     let values: Vec<_> = records.iter().map(|record| &record["value"]).filter(|value| !value.is_null()).collect();
     assert_eq!(values.len(), 2, "{records:?}");
     let pixels = &values[0]["pixels"];

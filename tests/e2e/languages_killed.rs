@@ -9,7 +9,6 @@ use rohrpost::Name;
 use rohrpost::interfaces::CameraInterface;
 use rohrpost_mailbox::{ClassTraffic, Loss, Next, Participant, StreamId, StreamReader};
 use std::collections::BTreeMap;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -26,9 +25,7 @@ const RESTART: &str = "restart = { backoff = \"50 ms\", at-most = 1000, within =
 
 /// The module in Python, which finds the package where it was built.
 fn seer(place: &Place) -> PathBuf {
-    let path = place.write("seer.py", SEER.replace("PACKAGE", package(place).to_str().unwrap()));
-    std::fs::set_permissions(&path, PermissionsExt::from_mode(0o755)).unwrap();
-    path
+    place.program("seer.py", SEER.replace("PACKAGE", package(place).to_str().unwrap()))
 }
 
 fn modules(place: &Place) -> Vec<String> {

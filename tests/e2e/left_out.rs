@@ -5,7 +5,6 @@ use crate::process::Running;
 use crate::terminal::Terminal;
 use nix::sys::signal::Signal;
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// A probe with a program of this name in place of this test's path.
@@ -121,8 +120,7 @@ fn start_and_restart_say_at_once_why_a_program_does_not_run() {
     place.say(&["restart", "probe.1"]).fails_with(["probe.1 is not started: for launch `./late` is no program at "]);
     assert_eq!(robot.pid("probe.1"), pid, "it goes on");
     // The kernel looks for the interpreter, and nobody before.
-    place.write("late", "#!/nowhere/python\n");
-    fs::set_permissions(place.path("late"), fs::Permissions::from_mode(0o755)).unwrap();
+    place.program("late", "#!/nowhere/python\n");
     for order in ["restart", "start"] {
         let told = place.say(&[order, "probe.1"]).fails();
         assert!(told.contains("probe.1 is not started: it could not be started: "), "{order}: {told}");
@@ -153,8 +151,7 @@ fn a_demo_shows_how_far_its_gui_is_until_that_joins() {
     place.write("build.log", "13 of 433 crates\n14 of");
     terminal.wait_screen("that it goes on", |screen| screen.contains("GUI bridge: 13 of 433 crates (build.log)"));
     // No module, but a program; it is never ready.
-    place.write("late", "#!/bin/sh\nexec sleep 1000\n");
-    fs::set_permissions(place.path("late"), fs::Permissions::from_mode(0o755)).unwrap();
+    place.program("late", "#!/bin/sh\nexec sleep 1000\n");
     place.say(&["start", "gui.0", "--no-wait"]).ok();
     terminal.wait_screen("that it has joined", |screen| {
         !screen.contains("GUI bridge") && screen.contains("gui.0 was left out and is started")

@@ -7,9 +7,7 @@ use crate::probe::ProbingInterface;
 use crate::process::Running;
 use crate::recorded::{RECORD, launched};
 use rohrpost::ToolLink;
-use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{RecorderInterface, RecordingState};
-use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{StreamId, SystemClock, TimeSource, monotonic_ns};
 use rohrpost_modules::journal::JOURNAL_NUMBER;
 use std::path::PathBuf;
@@ -56,9 +54,7 @@ struct Beat {
 
 /// The probe's last tick, if there was one.
 fn beat(robot: &Robot, tool: &mut ToolLink) -> Option<Beat> {
-    let port = ProbingInterface::BEAT;
-    let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-    let newest = tool.call(robot.name("probe.0"), GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
+    let newest = robot.newest(tool, "probe.0", ProbingInterface::BEAT);
     newest.ok().map(|(stamp_ns, number)| Beat { number, stamp_ns })
 }
 
@@ -182,12 +178,9 @@ fn what_a_module_does_before_the_log_begins_is_recorded_and_repeated() {
 fn before_a_log_begins_modules_are_found_and_nothing_is_recorded() {
     let (place, mut launch, robot) = launched(&["[time]\nsource = \"log\"\n", RECORD].concat());
     let mut tool = robot.tool(PATIENCE);
-    let port = RecorderInterface::STATE;
     // Published with each look.
     let state: RecordingState = wait("the recorder says how it is", || {
-        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let read = |bytes: &[u8]| from_bytes::<(u64, RecordingState)>(bytes);
-        let said = tool.call(robot.name("logd.0"), GET_DATA, (port.hash)(), write, read);
+        let said = robot.newest(&mut tool, "logd.0", RecorderInterface::STATE);
         // Two feeders have two items each; and there are the collector's lines.
         said.ok().map(|(_, state)| state).filter(|state| state.channels == 5)
     });

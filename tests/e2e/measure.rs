@@ -1,6 +1,6 @@
 //! The measuring tools, compared with a source that keeps its own record; and observing changes nothing.
 
-use crate::harness::{PATIENCE, Place, Robot, patient, probe, until, wait};
+use crate::harness::{PATIENCE, Place, Robot, json_lines, patient, probe, until, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe};
@@ -13,7 +13,7 @@ use std::time::Duration;
 pub(crate) fn lines(tool: &Running) -> Vec<Value> {
     let out = tool.out();
     let whole = out.rsplit_once('\n').map_or("", |(whole, _)| whole);
-    whole.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    json_lines(whole)
 }
 
 pub(crate) fn last(tool: &Running, holds: impl Fn(&Value) -> bool) -> Option<Value> {

@@ -1,6 +1,6 @@
 //! Several nodes of one place, each with a launch of its own; where there is a lab, each in a namespace of it.
 
-use crate::harness::{Place, Robot, python};
+use crate::harness::{Place, Robot, lacks_namespaces, python, until};
 use crate::process::{Running, Said};
 use rohrpost_routers::lab::Lab;
 use serde_json::Value;
@@ -30,6 +30,24 @@ pub(crate) fn nodes<A: Display>(nodes: impl IntoIterator<Item = (&'static str, A
 /// A module's table on a node.
 pub(crate) fn at(node: &str, module: &str) -> String {
     module.replacen("[[module]]\n", &format!("[[module]]\nnode = \"{node}\"\n"), 1)
+}
+
+/// All nodes of a file in namespaces, by one launch with these further words, once they run. None, with a report, where
+/// namespaces are not permitted.
+#[track_caller]
+pub(crate) fn launched_all(place: &Place, config: &Path, nodes: &[&str], words: &[&str]) -> Option<Running> {
+    let mut launch = place.start(&[&["launch", config.to_str().unwrap(), "--all"], words].concat());
+    until("all nodes run", || {
+        let out = launch.out();
+        let runs = |node: &&str| out.contains(&format!("│ node {node} of test runs: "));
+        launch.ended().is_some() || nodes.iter().all(runs)
+    });
+    if launch.ended().is_some() {
+        let said = launch.said();
+        assert!(lacks_namespaces(&said.err), "{said:#?}");
+        return None;
+    }
+    Some(launch)
 }
 
 /// Nodes that run.

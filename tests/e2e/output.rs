@@ -1,6 +1,6 @@
 //! Output of modules arrives: through floods, panics, full disks and the collector's own death.
 
-use crate::harness::{OUTPUT, Place, probe, signal, until, wait};
+use crate::harness::{OUTPUT, Place, json_lines, probe, signal, until, wait};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use std::fs;
@@ -8,7 +8,7 @@ use std::fs;
 /// The collector's lines of a module.
 pub(crate) fn lines(place: &Place, module: &str) -> Vec<Value> {
     let text = place.say(&["log", "--json", "--timeout", "60", "--module", module]).ok();
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    json_lines(&text)
 }
 
 /// Calls a function of a probe, however busy the computer is.

@@ -3,9 +3,6 @@
 use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, halt, probe, signal, until, wait};
 use crate::output::{call, is_own};
 use nix::sys::signal::Signal;
-use std::fs::File;
-use std::io::Write;
-use std::os::unix::fs::OpenOptionsExt;
 
 const PATIENT: [&str; 3] = ["log", "--timeout", "60"];
 
@@ -200,8 +197,7 @@ required = false
 settings = { map = "missing.map" }
 "#;
     let pilot = "[[module]]\nname = \"pilot.0\"\nprogram = \"./script\"\nrequired = false\n";
-    let script = File::options().write(true).create_new(true).mode(0o755).open(place.path("script"));
-    script.unwrap().write_all(b"#!/no/such/interpreter\n").unwrap();
+    place.program("script", "#!/no/such/interpreter\n");
     let config = place.config(&[RECORDED_CLASSES, motor, OUTPUT, pilot]);
     let _launch = place.launch(&config);
     let told = |module: &str| {

@@ -260,9 +260,8 @@ fn a_bad_file_is_told_before_anything_runs_or_by_the_module() {
 #[test]
 fn saved_values_of_built_in_modules_are_checked_before_anything_runs() {
     let place = Place::new();
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../config");
-    std::fs::copy(format!("{folder}/building.map"), place.path("building.map")).unwrap();
-    let demo = std::fs::read_to_string(format!("{folder}/demo.toml")).unwrap();
+    place.copy("config/building.map");
+    let demo = include_str!("../../config/demo.toml");
     place.write("demo.toml", format!("parameters = \"tuned.toml\"\n{demo}"));
     for (text, says) in [
         (

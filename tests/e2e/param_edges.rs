@@ -8,7 +8,6 @@ use crate::python_node::package;
 use rohrpost::parameter::ParameterSet;
 use rohrpost::{Context, Module, ModuleError};
 use serde_json::{Value, json};
-use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
 /// Not a test: what launch starts. Run as a test it ends at once.
@@ -266,9 +265,7 @@ fn what_a_parameter_in_rust_holds_survives_save_and_start() {
 #[test]
 fn what_a_parameter_in_python_holds_survives_save_and_start() {
     let place = Place::new();
-    let (program, path) = (place.path("edges.py"), package(&place));
-    std::fs::write(&program, PYTHON).unwrap();
-    std::fs::set_permissions(&program, PermissionsExt::from_mode(0o755)).unwrap();
+    let (program, path) = (place.program("edges.py", PYTHON), package(&place));
     Scene { place, program: format!("{program:?}"), path }.survives();
 }
 

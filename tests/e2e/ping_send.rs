@@ -1,6 +1,6 @@
 //! `ping` and `send`: commands over and over, and what came of each.
 
-use crate::harness::{PATIENCE, Place, halt, probe, signal, until};
+use crate::harness::{PATIENCE, Place, halt, json_lines, probe, signal, until};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
@@ -12,7 +12,7 @@ fn ping_counts_answers_and_ends_at_its_deadline() {
     assert!(text.contains("probe.0: 5 sent, 5 answered, 0 lost\nround min "), "{text}");
     assert!(text.contains(" (there ") && text.contains("\nthere min ") && text.contains("\nback  min "), "{text}");
     let said = place.say(&["ping", "probe.0", "-c", "3", "--interval", "0", "--json"]).ok();
-    let said: Vec<Value> = said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let said = json_lines(&said);
     assert_eq!((said.len(), &said[3]["answered"], &said[3]["lost"]), (4, &3.into(), &0.into()));
     let figures = ["min_s", "p50_s", "p99_s", "max_s"].map(|figure| said[3][figure].as_f64().unwrap());
     assert!(figures.is_sorted() && figures[0] > 0.0, "{figures:?}");

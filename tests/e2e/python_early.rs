@@ -5,7 +5,6 @@ use crate::harness::{OUTPUT, Place, Robot, head, until, wait};
 use crate::network::{NETWORK, addresses, at, nodes};
 use crate::process::Running;
 use crate::python_node::package;
-use std::os::unix::fs::PermissionsExt;
 
 const EARLY: &str = include_str!("python/early.py");
 const COUNTING: &str = include_str!("python/counting.py");
@@ -35,18 +34,13 @@ fn launched(settings: &str) -> (Place, Running, Robot) {
     let laser = "[[module]]\nnode = \"brain\"\nname = \"laser.0\"\nprogram = \"true\"\n";
     let modules = [at("base", OUTPUT), gripper, camera(0), camera(1), laser.to_owned()].concat();
     let config = place.write("robot.toml", [&head(CLASSES), REPLICA, NETWORK, &nodes, &modules].concat());
-    write_program(&place, "early.py", EARLY);
+    place.program("early.py", EARLY);
     let mut command = place.command(&["launch", config.to_str().unwrap(), "--node", "base"]);
     command.env("PYTHONPATH", package(&place)).env("PYTHONDONTWRITEBYTECODE", "1");
     let mut launch = Running::start(command);
     let robot = place.robot(&config, "base", &mut launch);
     launch.wait_for("runs: ");
     (place, launch, robot)
-}
-
-fn write_program(place: &Place, name: &str, code: &str) {
-    place.write(name, code);
-    std::fs::set_permissions(place.path(name), PermissionsExt::from_mode(0o755)).unwrap();
 }
 
 #[test]
@@ -70,7 +64,7 @@ fn a_reader_before_its_writer_waits_and_reads_from_the_first_record_on() {
     ];
     assert_eq!(early, serde_json::json!(told));
     // Their programs are there now.
-    write_program(&place, "counting.py", COUNTING);
+    place.program("counting.py", COUNTING);
     place.say(&["start", "camera.0"]).ok();
     assert_eq!(place.say(&["call", "gripper.0", "first", "--timeout", "60"]).ok(), "7\n");
     let last: u32 = place.say(&["call", "gripper.0", "last"]).ok().trim().parse().unwrap();

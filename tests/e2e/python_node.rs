@@ -1,9 +1,9 @@
 //! Modules in Python on the node: the gripper of the book beside a simulated robot, and what goes wrong in Python.
 
-use crate::harness::{Place, Robot, assert_has, head, python, repository, signal, until};
+use crate::harness::{Place, Robot, assert_has, head, json_lines, python, repository, signal, until};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::fs::symlink;
 use std::path::PathBuf;
 
 const FAULTY: &str = include_str!("python/faulty.py");
@@ -70,11 +70,9 @@ impl Scene {
     fn launched(code: &str, settings: &str) -> Self {
         let place = Place::new();
         let package = package(&place);
-        let (config, program) = (place.path("robot.toml"), place.path("gripper.py"));
         let map = format!("{:?}", repository("config/building.map"));
-        std::fs::write(&config, configured(&map, settings, code)).unwrap();
-        std::fs::write(&program, code).unwrap();
-        std::fs::set_permissions(&program, PermissionsExt::from_mode(0o755)).unwrap();
+        let config = place.write("robot.toml", configured(&map, settings, code));
+        place.program("gripper.py", code);
         let mut command = place.command(&["launch", config.to_str().unwrap()]);
         // Beside the sources nothing is to be written.
         command.env("PYTHONPATH", package).env("PYTHONDONTWRITEBYTECODE", "1");
@@ -182,7 +180,7 @@ fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
     }
     // Lines have the number of the kernel's error that they tell of.
     let lines = scene.says(&["log", "--module", "gripper.0", "--json"]).ok();
-    let lines: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines = json_lines(&lines);
     for (errno, words) in [(2, "FileNotFoundError: "), (28, "no room: [Errno 28] No space left on device")] {
         let told = lines.iter().find(|line| line["text"].as_str().unwrap().starts_with(words));
         assert_eq!(told.map(|line| &line["errno"]), Some(&errno.into()), "{lines:?}");

@@ -359,14 +359,12 @@ fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
 
 #[test]
 fn the_example_of_the_book_is_right() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let read = |file: &str| std::fs::read_to_string(root.join(file)).unwrap();
-    let page = read("docs/src/recording.md");
+    let page = include_str!("../../docs/src/recording.md");
     let example = page.split("```toml\n[classes]\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
     let (class, modules) = example.split_once("\n\n").unwrap();
-    let demo = read("config/demo.toml").replacen("[nodes.main]", &format!("{class}\n\n[nodes.main]"), 1);
+    let demo = include_str!("../../config/demo.toml").replacen("[nodes.main]", &format!("{class}\n\n[nodes.main]"), 1);
     let place = Place::new();
     place.write("demo.toml", format!("{demo}\n{modules}"));
-    std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
+    place.copy("config/building.map");
     place.say(&["check", "demo.toml"]).ok_with(["\nRecording\n"]);
 }

@@ -3,7 +3,7 @@
 //!
 //! For a long run: `ROHRPOST_BUSY_SECONDS=20 cargo test -p rohrpost-cli --test e2e recorded_busy`.
 
-use crate::harness::{Place, times};
+use crate::harness::{Place, json_lines, times};
 use crate::load::Load;
 use crate::recordings::messages;
 use rohrpost_recording::info;
@@ -44,7 +44,7 @@ fn beside_a_loop_on_each_processor_nothing_short_is_lost_and_modules_repeat_exac
         assert_eq!(channel.losses.all(), channel.lost, "each loss has its cause: {channel:?}");
     }
     let said = place.say(&["replay", "--exact", "--run-recorded", "--json", "out.mcap"]).out;
-    let runs: Vec<Value> = said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let runs = json_lines(&said);
     assert!(!runs.is_empty() && runs.iter().all(|run| run["result"] == "identical"), "{runs:#?}");
     println!("{}: {} messages, lost: {}", file.display(), told.messages, told.losses.text());
     place.assert_empty();

@@ -1,7 +1,7 @@
 //! A recorder hears modules of other nodes, over a network that loses packages: what is lost is counted.
 
-use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, lacks_namespaces, until, wait};
-use crate::network::{NETWORK, at, nodes};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, until};
+use crate::network::{NETWORK, at, launched_all, nodes};
 use crate::recorded::{feed, feed_until_recorded, feeder_entry, lines, number};
 use crate::recordings::messages;
 use rohrpost_recording::{Message, info};
@@ -53,17 +53,7 @@ fn data_and_output_of_another_node_are_recorded_or_counted() {
         &[RECORDED_CLASSES, NETWORK, &modules.concat()],
     );
     let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=11"];
-    let launch = [&["launch", config.to_str().unwrap(), "--all"][..], &bad].concat();
-    let mut launch = place.start(&launch);
-    // It ends at once where there are none.
-    let begun = wait("both nodes run", || {
-        let runs = ["base", "arm"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
-        if runs { Some(true) } else { launch.err().contains("cannot be made here").then_some(false) }
-    });
-    if !begun {
-        assert!(lacks_namespaces(&launch.err()));
-        return;
-    }
+    let Some(mut launch) = launched_all(&place, &config, &["base", "arm"], &bad) else { return };
     // A repeat that comes in a server's first seconds is refused: it cannot know whether one before it ran the command.
     std::thread::sleep(REPEATS_REFUSED);
     let file = place.path("recordings/base-0001.mcap");

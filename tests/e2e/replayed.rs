@@ -95,8 +95,7 @@ fn recorded_so_far(place: &Place) -> (u64, u64, u64) {
 
 /// Some seconds of a robot that drives and maps, from its first value on.
 fn record(place: &Place) -> PathBuf {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
+    place.copy("config/building.map");
     let config = place.config(&[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);

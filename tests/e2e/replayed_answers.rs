@@ -39,8 +39,7 @@ flush = "20 ms"
 #[test]
 fn a_command_to_a_played_module_gets_the_answer_that_was_recorded_for_it() {
     let place = Place::new();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
+    place.copy("config/building.map");
     let file = place.path("recordings/main-0001.mcap");
     let (mut launch, _robot) = place.launched(&[RECORDED_CLASSES, MODULES]);
     let journaled = || ["motor.0", "mapper.0"].map(|module| count(&file, module, |_| true));

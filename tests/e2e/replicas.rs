@@ -1,7 +1,7 @@
 //! A stream of one node is read on another as if it were written there: by this test, by the recorder and by tools.
 
-use crate::harness::{OUTPUT, Place, Robot, head, lacks_namespaces, until, wait};
-use crate::network::{NETWORK, Network, addresses, at, nodes};
+use crate::harness::{OUTPUT, Place, Robot, head, until, wait};
+use crate::network::{NETWORK, Network, addresses, at, launched_all, nodes};
 use crate::process::Running;
 use crate::recorded::{Frame, feed, feeder_entry, noise};
 use crate::recorded_nodes::values;
@@ -182,16 +182,7 @@ fn followed(place: &Place, network: &str, replica: &str, words: &[&str]) -> Opti
     let config = config(place, &["10.77.0.1".into(), "10.77.0.2".into()], network);
     // The file ends with the replica.
     std::fs::write(&config, std::fs::read_to_string(&config).unwrap() + replica).unwrap();
-    let launch = place.start(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat());
-    // It ends at once where there are none.
-    let begun = wait("both nodes run", || {
-        let runs = ["base", "brain"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
-        if runs { Some(true) } else { launch.err().contains("cannot be made here").then_some(false) }
-    });
-    if !begun {
-        assert!(lacks_namespaces(&launch.err()));
-        return None;
-    }
+    let launch = launched_all(place, &config, &["base", "brain"], words)?;
     until("the recorder follows the replica", || {
         feed(place, "feeder.0", 1);
         !recorded(place).is_empty()

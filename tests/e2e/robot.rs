@@ -4,6 +4,9 @@ use crate::harness::{PATIENCE, signal, until, wait};
 use crate::probe::{COUNT, ProbingInterface};
 use crate::process::Running;
 use nix::sys::signal::Signal;
+use rohrpost::common::GET_DATA;
+use rohrpost::interface::DataPort;
+use rohrpost::schema::Data;
 use rohrpost::serde::Serialize;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Name, ToolLink};
@@ -51,6 +54,17 @@ impl Robot {
         let counted = tool.call(self.name(module), COUNT, ProbingInterface::hash(), write, |bytes| from_bytes(bytes));
         tool.close();
         counted
+    }
+
+    /// A module's newest data, and when they were published.
+    pub(crate) fn newest<T: Data>(
+        &self,
+        tool: &mut ToolLink,
+        module: &str,
+        port: DataPort<T>,
+    ) -> Result<(u64, T), CallError> {
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        tool.call(self.name(module), GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes))
     }
 
     /// The module's process.

@@ -48,10 +48,8 @@ fn launch_can_be_stopped_while_modules_start() {
 
 #[test]
 fn a_module_that_does_not_switch_on_is_in_error_and_the_others_work() {
-    let place = Place::new();
-    let config = place.config(&[&probe("probe.0", "refuse-on = true", ""), &probe("probe.1", "", "")]);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
+    let (place, mut launch, robot) =
+        Place::begun(&[&probe("probe.0", "refuse-on = true", ""), &probe("probe.1", "", "")]);
     until("probe.1 is on", || robot.state("probe.1") == "on");
     launch.wait_for("probe.0 could not be switched on: ");
     assert!(launch.out().contains("a probe was asked not to work"), "{}", launch.out());
@@ -85,11 +83,8 @@ fn a_missing_program_is_told_before_anything_starts() {
 
 #[test]
 fn an_optional_module_is_left_out_with_a_notice() {
-    let place = Place::new();
     let missing = "[[module]]\nname = \"probe.1\"\nprogram = \"rohrpost-nowhere\"\noptional = true\n";
-    let config = place.config(&[&probe("probe.0", "", ""), missing, OUTPUT]);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
+    let (place, mut launch, robot) = Place::begun(&[&probe("probe.0", "", ""), missing, OUTPUT]);
     until("output.0 is on", || robot.state("output.0") == "on");
     launch.wait_for("the module is left out, since it is optional");
     let out = launch.stop();

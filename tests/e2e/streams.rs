@@ -1,7 +1,7 @@
 //! `rohrpost stream` and streams in `rohrpost clean`: written by one process, looked at and read by others.
 
 use crate::completions::offered;
-use crate::harness::{Place, assert_has, probe, until};
+use crate::harness::{Place, assert_has, json_lines, probe, until};
 use crate::process::Running;
 use rohrpost::Name;
 use rohrpost_mailbox::{Node, Participant, Stamp, StreamId, StreamShape};
@@ -39,11 +39,6 @@ fn start_writer(node: &Path) -> Running {
     let mut writer = Running::start(command);
     writer.wait_for("@written");
     writer
-}
-
-/// Objects, one a line.
-fn objects(text: &str) -> Vec<Value> {
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 #[test]
@@ -89,7 +84,7 @@ fn files_that_were_written_are_listed_and_read_back() {
     assert_eq!(read(&["--from", "0", "--raw", "-"]).ok(), "hello\x1b[2J");
     read(&["--from", "0", "--raw", "copy"]).ok();
     assert_eq!(std::fs::read(place.path("copy")).unwrap(), b"hello\x1b[2J");
-    let records = objects(&read(&["--from", "1", "--json"]).ok());
+    let records = json_lines(&read(&["--from", "1", "--json"]).ok());
     assert_eq!((records.len(), &records[0]["hex"], &records[1]["sequence"]), (2, &"1b5b324a".into(), &2.into()));
     // Five more: of eight, four are kept.
     place.say(&["stream", "write", "probe.0", "7", "a", "a", "a", "a", "a"]).ok();
@@ -112,7 +107,7 @@ fn the_two_records_around_a_time_are_read_or_it_is_said_why_not() {
         text,
         "before  #0  1.000000000  19 B  777269 … 16 B more\nafter   #1  2.000000000  19 B  777269 … 16 B more\n"
     );
-    let exact = objects(&at("2", &["--json"]).ok());
+    let exact = json_lines(&at("2", &["--json"]).ok());
     assert_eq!((&exact[0]["sequence"], &exact[1]["sequence"]), (&1.into(), &1.into()));
     assert_eq!((&exact[0]["side"], &exact[1]["side"]), (&"before".into(), &"after".into()));
     for (stamp, more, words) in [

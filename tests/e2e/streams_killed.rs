@@ -1,7 +1,7 @@
 //! The demo's simulation is killed again and again: readers of its streams go on by themselves, and each accounts for
 //! all that was written.
 
-use crate::harness::{PATIENCE, Place, Robot, signal, times, until, wait};
+use crate::harness::{PATIENCE, Place, Robot, json_lines, signal, times, until, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost::Name;
@@ -195,11 +195,6 @@ impl Readers {
     }
 }
 
-/// Objects that a tool has printed, one a line.
-fn printed(out: &str) -> Vec<Value> {
-    out.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"))).collect()
-}
-
 /// Waits until the mapper publishes the pose of a scan of this time or later.
 fn wait_mapped(place: &Place, stamp_ns: u64) {
     wait("the mapper maps scans of the new incarnation", || {
@@ -228,11 +223,11 @@ fn check_tool(tool: Running, odometry: &ObservedStream, written: u64) {
     wait("the tool comes to the end", || {
         let out = tool.out();
         let (whole, _) = out.rsplit_once('\n')?;
-        printed(whole.lines().last()?)[0]["sequence"].as_u64().filter(|sequence| sequence + 1 == written)
+        json_lines(whole.lines().last()?)[0]["sequence"].as_u64().filter(|sequence| sequence + 1 == written)
     });
     tool.signal(Signal::SIGINT);
     let mut at = 0;
-    for object in printed(&tool.said().ok()) {
+    for object in json_lines(&tool.said().ok()) {
         if let [Some(lost), Some(sampled), Some(passed_over)] =
             ["lost", "sampled", "passed_over"].map(|cause| object[cause].as_u64())
         {

@@ -3,7 +3,7 @@
 use crate::harness::{PATIENCE, Place, Robot, halt, probe, program, run_if_launched, signal, until, wait};
 use crate::probe::{NEWEST, ProbingInterface, SWAPPED};
 use nix::sys::signal::Signal;
-use rohrpost::common::{DataHead, GET_DATA, Refused, SUBSCRIBE, Subscribe};
+use rohrpost::common::{DataHead, Refused, SUBSCRIBE, Subscribe};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Context, Module, ModuleError, ToolLink};
 use rohrpost_mailbox::{Kind, Label, Loss, Name, Options, Participant, Shape, Type, local};
@@ -11,11 +11,7 @@ use rohrpost_modules::call::CallEnvelope;
 
 /// The newest published beat: it has been sent to all subscribers of each beat.
 fn beat(robot: &Robot, tool: &mut ToolLink) -> u64 {
-    let (module, hash) = (robot.name("probe.0"), ProbingInterface::hash());
-    let number = ProbingInterface::BEAT.number;
-    let (_stamp_ns, beat): (u64, u64) =
-        tool.call(module, GET_DATA, hash, |body| append(body, &(number,)), |bytes| from_bytes(bytes)).unwrap();
-    beat
+    robot.newest(tool, "probe.0", ProbingInterface::BEAT).unwrap().1
 }
 
 /// Beats that `probe.1` has written down.

@@ -8,11 +8,9 @@ use crate::harness::{Place, Robot, assert_has, lacks_namespaces, runs, signal, t
 use crate::process::{Running, Said};
 use losses::{Before, CYCLE, Kill, REPLACED, check_losses, check_lost_of_sealed, most_left_out};
 use nix::sys::signal::Signal;
-use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::RouterInterface;
 use rohrpost::schema::Data;
-use rohrpost::wire::{append, from_bytes};
 use rohrpost_testbed::stalls::{Late, unless_stalled};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -59,9 +57,7 @@ fn lost_so_far(robots: &[Robot; 3]) -> Option<Before> {
 /// The report of a node's router, if it answers.
 fn said<T: Data>(robot: &Robot, router: &str, port: DataPort<T>) -> Option<T> {
     let mut tool = robot.tool_if_there(SOON)?;
-    let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
-    let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
-    let said = tool.call(robot.name(router), GET_DATA, RouterInterface::hash(), ask, read);
+    let said = robot.newest(&mut tool, router, port);
     tool.close();
     said.ok().map(|(_, said)| said)
 }

@@ -1,6 +1,6 @@
 //! What modules publish and say, as tools show it.
 
-use crate::harness::{OUTPUT, Place, probe, until};
+use crate::harness::{OUTPUT, Place, json_lines, probe, until};
 use crate::output::{call, is_own};
 use crate::process::Running;
 use crate::recorded::{RECORD, launched};
@@ -8,14 +8,10 @@ use nix::sys::signal::Signal;
 use std::os::unix::fs::FileExt;
 use std::time::Instant;
 
-fn lines(text: &str) -> Vec<serde_json::Value> {
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
-}
-
 #[test]
 fn echo_counts_and_numbers_what_comes() {
     let (place, _launch, _robot) = Place::running(&[&probe("probe.0", "rate-hz = 50.0", "")]);
-    let shown = lines(&place.say(&["echo", "probe.0", "beat", "--count", "5", "--json"]).ok());
+    let shown = json_lines(&place.say(&["echo", "probe.0", "beat", "--count", "5", "--json"]).ok());
     assert_eq!(shown.len(), 5);
     for (index, pair) in shown.windows(2).enumerate() {
         assert_eq!(pair[0]["sequence"], index, "{pair:?}");
@@ -32,7 +28,7 @@ fn echo_counts_and_numbers_what_comes() {
 fn echo_with_a_rate_shows_the_newest_that_often() {
     let (place, _launch, _robot) = Place::running(&[&probe("probe.0", "rate-hz = 100.0", "")]);
     let start = Instant::now();
-    let shown = lines(&place.say(&["echo", "probe.0", "beat", "--rate", "10", "--count", "6", "--json"]).ok());
+    let shown = json_lines(&place.say(&["echo", "probe.0", "beat", "--rate", "10", "--count", "6", "--json"]).ok());
     let took = start.elapsed().as_secs_f64();
     assert!(took >= 0.45, "6 values 0.1 s apart came within {took} s");
     // Ten beats lie between two of ten a second; a busy computer makes it a few more or less.
@@ -47,7 +43,7 @@ fn echo_goes_on_when_its_module_is_restarted_and_ends_by_ctrl_c() {
     let restart = "restart = { backoff = \"50 ms\" }";
     let (place, _launch, robot) = Place::running(&[&probe("probe.0", "rate-hz = 50.0", restart)]);
     let mut echo = place.start(&["echo", "probe.0", "beat", "--json"]);
-    let beats = |echo: &Running| lines(echo.out().rsplit_once('\n').map_or("", |(whole, _)| whole));
+    let beats = |echo: &Running| json_lines(echo.out().rsplit_once('\n').map_or("", |(whole, _)| whole));
     until("it beats", || beats(&echo).len() > 20);
     robot.kill("probe.0");
     until("beats of the new incarnation", || {
@@ -79,7 +75,7 @@ fn what_modules_say_is_kept_and_filtered() {
         call(&place, &[module, "say", level, text]);
     }
     let texts = |arguments: &[&str]| -> Vec<String> {
-        let shown = lines(&place.say(&[&["log", "--json", "--timeout", "60"], arguments].concat()).ok());
+        let shown = json_lines(&place.say(&[&["log", "--json", "--timeout", "60"], arguments].concat()).ok());
         let asked = shown.iter().filter(|line| !is_own(line["text"].as_str().unwrap()));
         asked.map(|line| format!("{} {} {}", line["module"], line["level"], line["text"]).replace('"', "")).collect()
     };

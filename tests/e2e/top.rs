@@ -211,10 +211,7 @@ fn a_module_that_hangs_does_not_freeze_the_screen() {
 
 #[test]
 fn a_module_in_error_says_why() {
-    let place = Place::new();
-    let config = place.config(&[&probe("probe.0", "refuse-on = true", "")]);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
+    let (place, _launch, robot) = Place::begun(&[&probe("probe.0", "refuse-on = true", "")]);
     until("it is in error", || robot.state("probe.0") == "error");
     let (terminal, top) = Terminal::start(&place, &TOP, 24, 160);
     terminal.wait_row("probe.0", &["error"]);

@@ -18,11 +18,9 @@ mod twice;
 
 use crate::harness::{OUTPUT, PATIENCE, Place, lab, probe, until, wait};
 use crate::network::{Network, at, nodes};
-use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{LinkState, Links, PeerLink, RouterInterface};
 use rohrpost::schema::Data;
-use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Fault, Name};
 use rohrpost_config::Installation;
 use rohrpost_testbed::stalls::Stalls;
@@ -109,11 +107,9 @@ impl Field {
     /// A router's own report, at most half a second old.
     fn said<T: Data>(&self, node: &str, port: DataPort<T>) -> T {
         let robot = self.robot(node);
-        let router = robot.name(&router_of(node));
         wait(format!("{} of {node}", port.name), || {
             let mut tool = robot.tool(Duration::from_secs(2));
-            let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
-            let said = tool.call::<(u64, T)>(router, GET_DATA, (port.hash)(), ask, |bytes| from_bytes(bytes));
+            let said = robot.newest(&mut tool, &router_of(node), port);
             tool.close();
             // A router that was just started has no report yet.
             said.ok().map(|(_, said)| said)
