@@ -1,7 +1,7 @@
 //! Modules in C, the examples of `clients/c`, beside modules in Rust: compiled as the book says, launched, listed,
 //! called, killed, and with one stream that both read in place.
 
-use crate::harness::{NoSettings, OUTPUT, PATIENCE, Place, program, run_if_launched, runs, until, wait};
+use crate::harness::{NoSettings, OUTPUT, PATIENCE, Place, classes, program, run_if_launched, runs, until, wait};
 use crate::process::Running;
 use crate::terminal::open_pair;
 use rohrpost::interfaces::CameraInterface;
@@ -12,31 +12,15 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::LazyLock;
 
 const PAGE: &str = include_str!("../../docs/src/c.md");
 
-pub(crate) const CLASSES: &str = "
-[classes.thermometer]
-id = 120
-[classes.counter]
-id = 118
-[classes.motor]
-id = 200
-[classes.odometry]
-id = 160
-[classes.laser]
-id = 150
-[classes.camera]
-id = 112
-[classes.looker]
-id = 110
-[classes.viewer]
-id = 108
-[classes.asker]
-id = 106
-[classes.mapper]
-id = 95
-";
+pub(crate) static CLASSES: LazyLock<String> = LazyLock::new(|| {
+    let drivers =
+        "thermometer 120, counter 118, motor 200, odometry 160, laser 150, camera 112, looker 110, viewer 108";
+    classes(&format!("{drivers}, asker 106, mapper 95"))
+});
 
 /// Not a test: a module that launch starts. Run as a test it ends at once.
 #[test]
@@ -166,7 +150,7 @@ fn modules_in_rust_and_in_c_read_one_stream_in_place_that_a_camera_in_c_writes()
     let [camera, viewer] = ["camera", "viewer"].map(|name| format!("{:?}", example(&place, name)));
     let looker = program("c_modules::module");
     let (mut launch, robot) = place.launched(&[
-        CLASSES,
+        &CLASSES,
         &entry("camera.0", &camera, "[module.stream.image]\nrecord = \"256 KiB\"\nkeep = 4"),
         &entry("viewer.0", &viewer, "calls = [\"camera.0\"]"),
         &entry("looker.0", &looker, "calls = [\"camera.0\"]"),
@@ -214,7 +198,7 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
     let thermometer = format!("{:?}", book(&place, "thermometer.c"));
     let asker = format!("{:?}", compiled(&place, &client().join("tests/asker.c")));
     let (mut launch, robot) = place.launched(&[
-        CLASSES,
+        &CLASSES,
         &entry("thermometer.0", &thermometer, "settings = { volts-per-degree = 0.02 }"),
         &entry(
             "asker.0",
@@ -268,7 +252,7 @@ fn a_driver_in_c_gives_the_mapper_the_odometry_that_it_makes_of_a_serial_line() 
     let (line, slave, port) = open_pair();
     let map = client().join("../../config/building.map");
     let (mut launch, robot) = place.launched(&[
-        CLASSES,
+        &CLASSES,
         OUTPUT,
         "[[module]]\nname = \"motor.0\"\naliases = [\"odometry.1\", \"laser.0\"]\nbuiltin = \"sim\"\n",
         &format!("settings = {{ map = {map:?}, seed = 1, laser-rate-hz = 20 }}\n"),
@@ -309,7 +293,7 @@ fn the_programs_of_the_book_do_what_it_says() {
     let [thermometer, counter, echo] =
         ["thermometer.c", "counter.cpp", "echo.c"].map(|name| book(&place, name).display().to_string());
     let (mut launch, robot) = place.launched(&[
-        CLASSES,
+        &CLASSES,
         &entry("thermometer.0", &format!("{thermometer:?}"), "settings = { volts-per-degree = 0.02 }"),
         &entry("counter.0", &format!("{counter:?}"), ""),
     ]);

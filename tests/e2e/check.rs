@@ -74,7 +74,7 @@ const SAID: [(usize, &str); 12] = [
 
 /// Writes `wrong.toml` with these modules; what is to be told of their lines.
 fn wrong(place: &Place, modules: &str, told: &[(usize, &str)]) -> Vec<String> {
-    let file = place.config_of("wrong", "[nodes.main]", &[RECORDED_CLASSES, modules]);
+    let file = place.config_of("wrong", "[nodes.main]", &[&RECORDED_CLASSES, modules]);
     let text = std::fs::read_to_string(file).unwrap();
     let before = text.strip_suffix(modules).unwrap().lines().count();
     told.iter().map(|(line, said)| format!("wrong.toml:{}: {said}", before + line)).collect()

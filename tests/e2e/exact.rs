@@ -55,7 +55,7 @@ flush = "20 ms"
 "#;
 
 pub(crate) fn launched(place: &Place, modules: &str) -> (Running, Robot) {
-    let config = place.config(&[RECORDED_CLASSES, LOGD, modules]);
+    let config = place.config(&[&RECORDED_CLASSES, LOGD, modules]);
     place.copy("config/building.map");
     place.write("vision.map", "far");
     place.launched_from(&config)

@@ -18,6 +18,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::str::FromStr;
+use std::sync::LazyLock;
 use std::time::Instant;
 use tempfile::TempDir;
 
@@ -114,33 +115,24 @@ pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
     )
 }
 
+/// Tables of further classes, `class id, class id`.
+pub(crate) fn classes(classes: &str) -> String {
+    classes.split(", ").map(|class| format!("[classes.{}\n", class.replace(' ', "]\nid = "))).collect()
+}
+
 /// Classes of modules that are recorded and replayed, for configurations that have such.
-pub(crate) const RECORDED_CLASSES: &str = "
-[classes.motor]
-id = 200
-[classes.odometry]
-id = 160
-[classes.laser]
-id = 150
-[classes.pilot]
-id = 140
-[classes.seer]
-id = 110
-[classes.feeder]
-id = 100
-[classes.mapper]
-id = 95
-[classes.logd]
-id = 24
-";
+pub(crate) static RECORDED_CLASSES: LazyLock<String> = LazyLock::new(|| {
+    classes("motor 200, odometry 160, laser 150, pilot 140, seer 110, feeder 100, mapper 95, logd 24")
+});
 
 /// A simulated robot with streams, one of them of pictures; first of a configuration, since classes are before modules.
 pub(crate) fn simulated() -> String {
     let map = repository("config/building.map");
     format!(
-        "{RECORDED_CLASSES}[classes.camera]\nid = 112\n[[module]]\nname = \"motor.0\"\nbuiltin = \"sim\"\n\
+        "{}[classes.camera]\nid = 112\n[[module]]\nname = \"motor.0\"\nbuiltin = \"sim\"\n\
          aliases = [\"odometry.0\", \"laser.0\", \"camera.0\"]\nsettings = {{ map = {map:?}, camera-rate-hz = 2 }}\n\
-         [module.stream.image]\nrecord = \"1 MiB\"\nkeep = 4\n"
+         [module.stream.image]\nrecord = \"1 MiB\"\nkeep = 4\n",
+        *RECORDED_CLASSES
     )
 }
 

@@ -25,7 +25,7 @@ fn a_mistake_that_stays_is_told_once_and_not_tried_again() {
     for (module, words) in cases {
         let place = Place::new();
         let hopeless = module(&place);
-        let config = place.config(&[RECORDED_CLASSES, &hopeless, OUTPUT, &probe("probe.0", "", "")]);
+        let config = place.config(&[&RECORDED_CLASSES, &hopeless, OUTPUT, &probe("probe.0", "", "")]);
         let mut launch = place.launch(&config);
         launch.wait_for("runs: ");
         launch.wait_for(" does not start; the others go on without it");
@@ -42,7 +42,7 @@ fn a_mistake_that_stays_is_told_once_and_not_tried_again() {
 fn what_may_get_better_is_told_whole_once_and_then_in_short() {
     let place = Place::new();
     let flaky = python(&place, "raise RuntimeError('the port is not there')", "required = false");
-    let config = place.config(&[RECORDED_CLASSES, &flaky, OUTPUT, &probe("probe.0", "", "")]);
+    let config = place.config(&[&RECORDED_CLASSES, &flaky, OUTPUT, &probe("probe.0", "", "")]);
     let mut launch = place.launch(&config);
     launch.wait_for("starts again in 800ms; as before");
     let told = launch.out();
@@ -55,7 +55,7 @@ fn what_may_get_better_is_told_whole_once_and_then_in_short() {
 #[test]
 fn nobody_is_said_to_go_on_where_there_are_no_others() {
     let place = Place::new();
-    let config = place.config(&[RECORDED_CLASSES, OUTPUT, &python(&place, "def hold(:", "required = false")]);
+    let config = place.config(&[&RECORDED_CLASSES, OUTPUT, &python(&place, "def hold(:", "required = false")]);
     let said = place.start(&["launch", config.to_str().unwrap()]).said();
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.err.contains("module pilot.0 did not become ready") && said.err.contains("SyntaxError"), "{said:?}");

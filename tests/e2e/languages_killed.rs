@@ -2,7 +2,7 @@
 //! Python read in place. Those that are not killed go on, pictures are whole, and accounts balance as in Rust.
 
 use crate::c_modules::{CLASSES, compiled, entry, example, said, seen};
-use crate::harness::{OUTPUT, Place, Robot, program, repository, signal, times, until};
+use crate::harness::{OUTPUT, Place, Robot, classes, program, repository, signal, times, until};
 use crate::python_node::package;
 use nix::sys::signal::Signal;
 use rohrpost::Name;
@@ -34,8 +34,8 @@ fn modules(place: &Place) -> Vec<String> {
     let stream = "[module.stream.image]\nrecord = \"256 KiB\"\nkeep = 4\n";
     let reads = format!("calls = [\"camera.0\"]\n{RESTART}");
     vec![
-        CLASSES.into(),
-        "[classes.seer]\nid = 107\n".into(),
+        CLASSES.clone(),
+        classes("seer 107"),
         OUTPUT.into(),
         entry("camera.0", &quoted(&example(place, "camera")), &format!("{RESTART}\n{stream}")),
         entry("viewer.0", &quoted(&compiled(place, &Path::new(&repository(WATCHER)))), &reads),

@@ -198,7 +198,7 @@ settings = { map = "missing.map" }
 "#;
     let pilot = "[[module]]\nname = \"pilot.0\"\nprogram = \"./script\"\nrequired = false\n";
     place.program("script", "#!/no/such/interpreter\n");
-    let config = place.config(&[RECORDED_CLASSES, motor, OUTPUT, pilot]);
+    let config = place.config(&[&RECORDED_CLASSES, motor, OUTPUT, pilot]);
     let _launch = place.launch(&config);
     let told = |module: &str| {
         let said = place.say(&["log", "--timeout", "60", "--json", "--level", "error", "--module", module]);

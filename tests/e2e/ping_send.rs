@@ -2,7 +2,6 @@
 
 use crate::harness::{PATIENCE, Place, halt, json_lines, probe, signal, until};
 use nix::sys::signal::Signal;
-use serde_json::Value;
 
 #[test]
 fn ping_counts_answers_and_ends_at_its_deadline() {

@@ -4,7 +4,6 @@ use crate::harness::{OUTPUT, Place, probe, until, wait};
 use crate::output::{call, lines};
 use crate::probe::FILE;
 use crate::process::Running;
-use nix::sys::signal::Signal;
 use serde_json::Value;
 
 fn texts(lines: &[Value], level: &str) -> Vec<String> {
@@ -161,8 +160,7 @@ fn launch_shows_what_modules_say_if_it_is_asked_to() {
         let shown = wait("it is shown", || Some(launch.err()).filter(|err| err.contains("probe.0: a complaint\n")));
         assert_eq!(shown.contains(" info  main/probe.0: is on\n"), is_shown, "{log}: {shown}");
         until("what it printed", || !is_shown || launch.err().contains("probe.0: a remark 0\n"));
-        launch.signal(Signal::SIGINT);
-        assert!(launch.end().success());
+        launch.stop();
         assert_eq!(
             (launch.out().as_str(), launch.err().contains('\u{1b}')),
             ("node main of test runs: 2 modules\n", false)

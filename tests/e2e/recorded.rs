@@ -132,7 +132,7 @@ pub(crate) fn launched(record: &str) -> (Place, Running, Robot) {
 
 /// The same, with another entry of the recorder.
 pub(crate) fn launched_with(place: &Place, logd: &str, record: &str) -> (Running, Robot) {
-    let config = place.config(&[RECORDED_CLASSES, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record]);
+    let config = place.config(&[&RECORDED_CLASSES, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record]);
     place.launched_from(&config)
 }
 

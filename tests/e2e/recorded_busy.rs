@@ -7,7 +7,6 @@ use crate::harness::{Place, json_lines, times};
 use crate::load::Load;
 use crate::recordings::messages;
 use rohrpost_recording::info;
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 

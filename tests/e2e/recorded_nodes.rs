@@ -50,7 +50,7 @@ fn data_and_output_of_another_node_are_recorded_or_counted() {
     let config = place.config_of(
         "test",
         &nodes([("base", "10.77.0.1"), ("arm", "10.77.0.2")]),
-        &[RECORDED_CLASSES, NETWORK, &modules.concat()],
+        &[&RECORDED_CLASSES, NETWORK, &modules.concat()],
     );
     let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=11"];
     let Some(mut launch) = launched_all(&place, &config, &["base", "arm"], &bad) else { return };

@@ -96,7 +96,7 @@ fn recorded_so_far(place: &Place) -> (u64, u64, u64) {
 /// Some seconds of a robot that drives and maps, from its first value on.
 fn record(place: &Place) -> PathBuf {
     place.copy("config/building.map");
-    let config = place.config(&[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
+    let config = place.config(&[&RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
     until("the modules are there", || {
@@ -165,7 +165,7 @@ pub(crate) fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
 
 /// The node of a replay.
 fn replaying(place: &Place, replay: &mut Running) -> Robot {
-    let config = place.config_of("test-replay", "[nodes.main]", &[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
+    let config = place.config_of("test-replay", "[nodes.main]", &[&RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     Installation::load(&config).unwrap();
     let robot = place.robot(&config, "replay", replay);
     wait("the player is there", || {

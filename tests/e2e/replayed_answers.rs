@@ -5,7 +5,6 @@ use crate::exact::count;
 use crate::harness::{Place, RECORDED_CLASSES, until, wait};
 use crate::replayed::{call, position, replay};
 use rohrpost_recording::info;
-use std::path::Path;
 
 const MODULES: &str = r#"
 [time]
@@ -41,7 +40,7 @@ fn a_command_to_a_played_module_gets_the_answer_that_was_recorded_for_it() {
     let place = Place::new();
     place.copy("config/building.map");
     let file = place.path("recordings/main-0001.mcap");
-    let (mut launch, _robot) = place.launched(&[RECORDED_CLASSES, MODULES]);
+    let (mut launch, _robot) = place.launched(&[&RECORDED_CLASSES, MODULES]);
     let journaled = || ["motor.0", "mapper.0"].map(|module| count(&file, module, |_| true));
     until("journals are recorded", || journaled().iter().all(|count| *count > 0));
     let drive = ["call", "motor.0", "drive", "0.25", "0.125"];

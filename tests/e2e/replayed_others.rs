@@ -1,6 +1,7 @@
 //! `rohrpost replay` of what rosbag2 recorded: its messages come into streams byte for byte, with their stamps, and as
 //! far apart as they came.
 
+use crate::conforming::hex;
 use crate::harness::{Place, head, until, wait};
 use crate::process::Running;
 use crate::recordings::messages;
@@ -92,10 +93,6 @@ pub(crate) fn bag_that_says(place: &Place, text: &str) -> PathBuf {
     writer.write_to_known_channel(&header, text.as_bytes()).unwrap();
     writer.finish().unwrap();
     path
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Waits until the player has a position.

@@ -26,8 +26,7 @@ fn a_terminal_shows_a_live_table() {
     crate::harness::signal(pid, Signal::SIGKILL);
     terminal.wait_for("probe.0 was killed by signal 9; starts again in");
     robot.wait_restarted("probe.0", pid);
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success(), "{}", terminal.drawn());
+    launch.stop();
     assert!(!terminal.drawn().contains("panicked"), "{}", terminal.drawn());
     place.assert_empty();
 }
@@ -47,8 +46,7 @@ fn a_closed_terminal_hurts_nobody() {
     crate::harness::signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.0", pid);
     let pid = robot.pid("probe.0");
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success());
+    launch.stop();
     assert!(!runs(pid));
     place.assert_empty();
 }
@@ -69,8 +67,7 @@ fn a_live_table_has_all_columns_and_all_names_in_eighty_columns() {
         assert!(screen.split_whitespace().any(|word| word == head), "no {head}:\n{screen}");
     }
     assert!(!screen.contains('\\'), "{screen}");
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success());
+    launch.stop();
 }
 
 #[test]
@@ -85,8 +82,7 @@ fn what_modules_say_stands_below_the_live_table_which_keeps_its_place() {
     let screen = terminal.wait_screen("the last line", is_last);
     let first = screen.lines().next().unwrap_or_default();
     assert!(first.starts_with("test, ") && screen.contains("probe.0"), "the table has moved:\n{screen}");
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success());
+    launch.stop();
 }
 
 #[test]

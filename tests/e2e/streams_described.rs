@@ -2,7 +2,8 @@
 //! at a time.
 
 use crate::completions::offered;
-use crate::harness::{NoSettings, OUTPUT, Place, RECORDED_CLASSES, Robot, program, run_if_launched, wait};
+use crate::conforming::unhex;
+use crate::harness::{NoSettings, OUTPUT, Place, RECORDED_CLASSES, Robot, classes, program, run_if_launched, wait};
 use crate::process::{Running, Said};
 use rohrpost::interfaces::WheelsInterface;
 use rohrpost::types::Odometry;
@@ -46,12 +47,6 @@ impl Reading for Reader {
 
 /// A robot that drives about, and a module that reads its odometry.
 const ROBOT: &str = r#"
-[classes.camera]
-id = 112
-[classes.depth]
-id = 104
-[classes.reader]
-id = 94
 [[module]]
 name = "motor.0"
 aliases = ["odometry.0", "laser.0", "camera.0", "depth.0"]
@@ -84,7 +79,7 @@ fn launched() -> (Place, Running, Robot) {
     let map = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
     let program = program("streams_described::reader");
     let text = ROBOT.replace("MAP", map).replace("PROGRAM", &program);
-    Place::running(&[RECORDED_CLASSES, &text, OUTPUT])
+    Place::running(&[&RECORDED_CLASSES, &classes("camera 112, depth 104, reader 94"), &text, OUTPUT])
 }
 
 fn interp(place: &Place, stream: &[&str], more: &[&str]) -> Said {
@@ -191,9 +186,7 @@ fn records_are_told_as_the_module_describes_them_and_a_picture_by_its_size_and_h
     assert!(line.starts_with(&words) && line.contains(" B  {pose: {x_m: "), "{line}");
     // The same as the type itself reads from the bytes.
     let bytes = read(&ODOMETRY, &[&from[..], &["--hex", "--json"]].concat()).json();
-    let hex = bytes["hex"].as_str().unwrap();
-    let bytes: Vec<u8> =
-        (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect();
+    let bytes = unhex(bytes["hex"].as_str().unwrap());
     let odometry: Odometry = rohrpost::wire::from_bytes(&bytes).unwrap();
     let value = &newest["value"];
     assert!((odometry.pose.x_m - number(&value["pose"]["x_m"])).abs() < 1e-12, "{value}");

@@ -8,7 +8,6 @@ use rohrpost::Name;
 use rohrpost::description::noted;
 use rohrpost::schema::{DataItem, decode};
 use rohrpost_mailbox::{HeldRecord, Next, Participant, RecordInfo, StreamId, StreamInfo, StreamReader};
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;

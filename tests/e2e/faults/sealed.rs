@@ -38,7 +38,7 @@ impl Field {
     }
 
     /// A configuration of two nodes with these security settings, in which the collector of lines is on the other node.
-    fn collects_on_arm(&self, security: &str) -> PathBuf {
+    pub(super) fn collects_on_arm(&self, security: &str) -> PathBuf {
         let log = LOG.replace("robot.log", "arm.log");
         let other = configure(&self.place, "other", 2, security, &[&at("arm", OUTPUT), &log]);
         // One installation for shared memory.

@@ -14,13 +14,7 @@ use std::time::{Duration, Instant};
 #[test]
 fn nodes_with_different_configurations_refuse_each_other_and_both_say_why() {
     let Some(mut field) = Field::new(2, "") else { return };
-    // The same two nodes; but the collector of lines is on the other one.
-    let log = LOG.replace("robot.log", "arm.log");
-    let other = configure(&field.place, "other", 2, "", &[&at("arm", OUTPUT), &log]);
-    // One installation for shared memory.
-    let text = std::fs::read_to_string(&other).unwrap();
-    std::fs::write(&other, text.replace("installation = \"other\"", "installation = \"test\"")).unwrap();
-    let config = field.config.clone();
+    let (config, other) = (field.config.clone(), field.collects_on_arm(""));
     field.launch_deaf(&["base"]);
     field.network.launch_from(&other, &["arm"]);
 
