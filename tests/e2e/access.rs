@@ -1,15 +1,14 @@
 //! `[access]` also restricts commands between modules of one node.
 
-use crate::harness::{PATIENCE, Place, probe, wait};
+use crate::harness::{PATIENCE, Place, probe, until};
 use crate::probe::{COUNT, ProbingInterface};
 use rohrpost::common::{DESCRIBE, HASH, OFF};
 use rohrpost::{CallError, Fault};
 
 #[test]
 fn on_one_node_a_class_that_is_not_listed_commands_nothing_and_is_told_the_line() {
-    let place = Place::new();
     let access = "[access]\nprobe = [\"probe\"]\n";
-    let (mut launch, robot) = place.launched(&[
+    let (place, mut launch, robot) = Place::running(&[
         access,
         &probe("probe.0", "rate-hz = 100.0", ""),
         // Its class is listed: its subscriptions are commands, too.
@@ -28,7 +27,7 @@ fn on_one_node_a_class_that_is_not_listed_commands_nothing_and_is_told_the_line(
     }
     assert_eq!((place.counted(), robot.state("probe.0")), (Vec::new(), "on"), "launch switched it on");
     let hears = || place.record().iter().any(|line| line.starts_with("probe.1 each"));
-    wait("a class that is listed subscribes", || hears().then_some(()));
+    until("a class that is listed subscribes", || hears());
     tool.close();
     launch.stop();
 }

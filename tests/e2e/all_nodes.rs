@@ -1,6 +1,7 @@
 //! `launch --all`: all nodes of a configuration on this computer, in network namespaces.
 
-use crate::harness::{NETWORK, OUTPUT, Place, lacks_namespaces, probe, runs, wait};
+use crate::harness::{OUTPUT, Place, assert_has, lacks_namespaces, probe, runs, until};
+use crate::network::{NETWORK, at, launched_all, nodes};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost_testbed::report::skipped;
@@ -8,36 +9,24 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::os::unix::fs::chown;
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-const NODES: &str =
-    "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\ntools = [16, 31]\n";
+fn two() -> String {
+    nodes([("base", "10.77.0.1"), ("arm", "10.77.0.2")]) + NETWORK
+}
 
 /// probe.0 on `base`, and on `arm` probe.1, with further settings and keys.
 fn configured(place: &Place, settings: &str, keys: &str) -> PathBuf {
     let modules =
         [probe("probe.0", "", "node = \"base\""), probe("probe.1", settings, &format!("node = \"arm\"\n{keys}"))];
-    place.config_of("test", &format!("{NODES}{NETWORK}"), &[&modules[0], &modules[1]])
+    place.config_of("test", &two(), &[&modules[0], &modules[1]])
 }
 
-fn all(place: &Place, config: &Path, further: &[&str]) -> Running {
-    Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"], further].concat()))
-}
-
-/// Whether the system allows namespaces here.
-fn is_allowed() -> bool {
-    let place = Place::new();
-    let config = configured(&place, "exit_at_start = 3", "restart = \"never\"");
-    let told = all(&place, &config, &[]).said().err;
-    !lacks_namespaces(&told)
-}
-
-/// Waits until all modules of both nodes are on.
-fn wait_until_both_run(launch: &mut Running) {
-    for node in ["base", "arm"] {
-        launch.wait_for(&format!("│ node {node} of test runs: 2 modules"));
-    }
+/// Both nodes, with these further words for launch.
+fn both(place: &Place, words: &[&str]) -> Option<(Running, PathBuf)> {
+    let config = configured(place, "", "");
+    Some((launched_all(place, &config, &["base", "arm"], words)?, config))
 }
 
 /// Processes that a process has started, recursively.
@@ -53,13 +42,9 @@ fn devices() -> BTreeSet<std::ffi::OsString> {
 
 #[test]
 fn nodes_start_talk_and_are_stopped() {
-    if !is_allowed() {
-        return;
-    }
     let (place, before) = (Place::new(), devices());
-    let config = configured(&place, "", "");
-    let mut launch = all(&place, &config, &[]);
-    wait_until_both_run(&mut launch);
+    let Some((mut launch, config)) = both(&place, &[]) else { return };
+    assert_has(&launch.out(), ["│ node base of test runs: 2 modules", "│ node arm of test runs: 2 modules"]);
     assert!(launch.out().starts_with("security = \"none\": packages between nodes are neither sealed nor signed"));
     assert_eq!(place.say_at(&config, "base", &["call", "probe.1", "count", "1"]).ok(), "1\n");
     assert_eq!(place.say_at(&config, "arm", &["call", "probe.0", "count", "2"]).ok(), "1\n");
@@ -77,29 +62,24 @@ fn nodes_start_talk_and_are_stopped() {
 
 #[test]
 fn nothing_is_left_when_it_is_killed() {
-    if !is_allowed() {
-        return;
-    }
     let place = Place::new();
-    let config = configured(&place, "", "");
-    let mut launch = all(&place, &config, &[]);
-    wait_until_both_run(&mut launch);
+    let Some((mut launch, _config)) = both(&place, &[]) else { return };
     let processes = below(launch.pid());
     assert_eq!(processes.len(), 6);
-    launch.signal(Signal::SIGKILL);
-    launch.end();
-    wait("all that it started ends", || processes.iter().all(|pid| !runs(*pid)).then_some(()));
+    launch.kill();
+    until("all that it started ends", || processes.iter().all(|pid| !runs(*pid)));
     place.assert_empty();
 }
 
 #[test]
 fn a_node_that_does_not_start_ends_them_all() {
-    if !is_allowed() {
-        return;
-    }
     let place = Place::new();
     let config = configured(&place, "exit_at_start = 3", "restart = \"never\"");
-    let told = all(&place, &config, &[]).said().fails();
+    let said = place.say(&["launch", config.to_str().unwrap(), "--all"]);
+    if lacks_namespaces(&said.err) {
+        return;
+    }
+    let told = said.fails();
     assert!(told.contains("arm │ module probe.1 did not become ready"), "{told}");
     assert!(told.contains("node arm did not start: exit status: 1"), "{told}");
     place.assert_empty();
@@ -108,36 +88,25 @@ fn a_node_that_does_not_start_ends_them_all() {
 /// A killed node is reported, and the others go on.
 #[test]
 fn a_node_that_ends_leaves_the_others_alone() {
-    if !is_allowed() {
-        return;
-    }
     let place = Place::new();
-    let config = configured(&place, "", "");
-    let mut launch = all(&place, &config, &[]);
-    wait_until_both_run(&mut launch);
+    let Some((mut launch, config)) = both(&place, &[]) else { return };
     let arm = place.robot_at(&config, "arm").node.launcher().unwrap();
     crate::harness::signal(arm, Signal::SIGKILL);
-    wait("its end is told", || launch.err().contains("node arm ended: signal: 9").then_some(()));
+    until("its end is told", || launch.err().contains("node arm ended: signal: 9"));
     assert_eq!(place.say_at(&config, "base", &["call", "probe.0", "count", "1"]).ok(), "1\n");
-    launch.signal(Signal::SIGINT);
-    assert_eq!(launch.end().code(), Some(1), "a node failed");
+    launch.stop_failed();
     // Its modules end after their launch; `clean` removes files that it had no time to remove.
-    wait("nothing of it lives", || {
+    until("nothing of it lives", || {
         place.say(&["clean"]).ok();
-        std::fs::read_dir(place.memory()).unwrap().next().is_none().then_some(())
+        std::fs::read_dir(place.memory()).unwrap().next().is_none()
     });
 }
 
 #[test]
 fn calls_are_counted_once_over_a_bad_network() {
-    if !is_allowed() {
-        return;
-    }
     let place = Place::new();
-    let config = configured(&place, "", "");
     let bad = "loss=10%,delay=1ms,jitter=500us,duplicate=5%,reorder=10%,seed=3";
-    let mut launch = all(&place, &config, &["--impair", bad]);
-    wait_until_both_run(&mut launch);
+    let Some((mut launch, config)) = both(&place, &["--impair", bad]) else { return };
     let mut expected = Vec::new();
     for number in 1..=12 {
         let said = place.say_at(&config, "base", &["call", "probe.1", "count", &number.to_string()]);
@@ -150,8 +119,7 @@ fn calls_are_counted_once_over_a_bad_network() {
     let once: BTreeSet<u32> = counted.iter().copied().collect();
     assert_eq!(once.len(), counted.len(), "twice: {counted:?}");
     assert!(expected.len() >= 10 && expected.iter().all(|number| once.contains(number)), "{expected:?} {counted:?}");
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
@@ -163,8 +131,7 @@ fn what_cannot_be_launched_is_told_with_its_remedy() {
     assert_eq!(told, format!("{one} has one node; launch it without --all: rohrpost launch {one}\n"));
     let config = configured(&place, "", "");
     let config = config.to_str().unwrap();
-    let told = place.say(&["launch", config, "--node", "roof"]).fails();
-    assert!(told.contains("roof") && told.contains("base, arm"), "{told}");
+    place.say(&["launch", config, "--node", "roof"]).fails_with(["roof", "base, arm"]);
     for (arguments, words) in [
         (&["--all", "--node", "base"][..], "cannot be used with"),
         (&["--impair", "loss=5%"], "--all"),
@@ -185,7 +152,7 @@ fn a_user_without_rights_launches_all_nodes() {
     }
     let place = Place::new();
     // Not a program in the tests' own folder: users may have no access to that folder.
-    let config = place.config_of("test", &format!("{NODES}{NETWORK}"), &[&format!("{OUTPUT}node = \"arm\"\n")]);
+    let config = place.config_of("test", &two(), &[&at("arm", OUTPUT)]);
     let launch = place.command(&["launch", config.to_str().unwrap(), "--all"]);
     let program = place.path("rohrpost");
     // Copied by a process of its own: a file that this process has open for writing is also held by a child that
@@ -199,15 +166,14 @@ fn a_user_without_rights_launches_all_nodes() {
     command.args(launch.get_args()).env("ROHRPOST_DIR", place.memory()).current_dir(config.parent().unwrap());
     command.uid(NOBODY).gid(NOBODY).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut launch = Running::start(command);
-    wait("it runs, or may not", || {
+    until("it runs, or may not", || {
         let runs = ["base of test runs: 1 module", "arm of test runs: 2 modules"];
-        (launch.ended().is_some() || runs.iter().all(|runs| launch.out().contains(runs))).then_some(())
+        launch.ended().is_some() || runs.iter().all(|runs| launch.out().contains(runs))
     });
     if lacks_namespaces(&launch.err()) {
         return;
     }
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 /// As on a computer without the right: a user namespace with a limit of zero.

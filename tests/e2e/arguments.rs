@@ -1,16 +1,14 @@
 //! What people type: numbers below zero, texts that begin as JSON does, a class for its one module.
 
-use crate::harness::{OUTPUT, Place, probe, program, wait};
+use crate::harness::{NoSettings, OUTPUT, Place, probe, program, run_if_launched, until, wait};
 use crate::probe::{ProbingInterface, ProbingProxy, WORK};
 use crate::tuned::{shown, tuned};
-use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError, Rate, Received, Subscription};
 use std::time::Duration;
 
 #[test]
 fn numbers_below_zero_and_texts_that_begin_as_json_are_values() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[&probe("probe.0", "", ""), &tuned("probe.1", "", "")]);
+    let (place, _launch, _robot) = Place::running(&[&probe("probe.0", "", ""), &tuned("probe.1", "", "")]);
     for (number, ratio, word, told) in [
         ("-3", "-1e-3", "[x", "-3 -0.001 [x"),
         ("-1e3", "-.5", "{x}", "-1000 -0.5 {x}"),
@@ -36,8 +34,7 @@ fn numbers_below_zero_and_texts_that_begin_as_json_are_values() {
     ] {
         assert_eq!(place.say(&["param", "set", "probe.1", parameter, value]).ok(), told);
     }
-    let told = place.say(&["param", "set", "probe.1", "gain", "-inf"]).fails();
-    assert!(told.contains("`gain` is -inf, out of range"), "{told}");
+    place.say(&["param", "set", "probe.1", "gain", "-inf"]).fails_with(["`gain` is -inf, out of range"]);
     let told = place.say(&["call", "probe.0", "tell", "1", "1", "x", "true", "[1"]).fails();
     assert!(told.starts_with("list: EOF while parsing a list"), "{told}");
     let said = place.say(&["call", "probe.0", "tell", "-x"]);
@@ -46,8 +43,7 @@ fn numbers_below_zero_and_texts_that_begin_as_json_are_values() {
 
 #[test]
 fn a_class_is_its_one_module_in_all_tools_and_of_several_all_are_named() {
-    let place = Place::new();
-    let (launch, _robot) = place.launched(&[OUTPUT, &tuned("probe.0", "", "")]);
+    let (place, launch, _robot) = Place::running(&[OUTPUT, &tuned("probe.0", "", "")]);
     wait("its data are described", || place.say(&["hz", "probe", "--window", "0.2", "--count", "1"]).code);
     for (words, told) in [
         (&["call", "probe"][..], "class probe: "),
@@ -62,11 +58,10 @@ fn a_class_is_its_one_module_in_all_tools_and_of_several_all_are_named() {
         (&["interface", "export", "probe"], "class probe: "),
         (&["restart", "probe"], "probe.0 runs and is on after "),
     ] {
-        wait(format!("{words:?} tells {told:?}"), || place.say(words).out.contains(told).then_some(()));
+        until(format!("{words:?} tells {told:?}"), || place.say(words).out.contains(told));
     }
     drop(launch);
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[OUTPUT, &tuned("probe.0", "", ""), &tuned("probe.1", "", "")]);
+    let (place, _launch, robot) = Place::running(&[OUTPUT, &tuned("probe.0", "", ""), &tuned("probe.1", "", "")]);
     for words in [
         &["call", "probe"][..],
         &["status", "probe"],
@@ -79,19 +74,17 @@ fn a_class_is_its_one_module_in_all_tools_and_of_several_all_are_named() {
     ] {
         assert_eq!(place.say(words).fails(), "`probe` may be probe.0 or probe.1; say which\n", "{words:?}");
     }
-    let told = place.say(&["call", "prob"]).fails();
-    assert!(told.contains("`prob` is no mailbox name; write class.instance"), "{told}");
+    place.say(&["call", "prob"]).fails_with(["`prob` is no mailbox name; write class.instance"]);
     assert_eq!(shown(place.say(&["param", "get", "probe.1"]), "gain"), "1");
     assert_eq!(robot.state("probe.0"), "on");
 }
 
 #[test]
 fn of_a_module_that_does_not_answer_all_tools_tell_what_list_knows() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[&probe("probe.0", "", "busy-after = \"100 ms\"")]);
+    let (place, _launch, robot) = Place::running(&[&probe("probe.0", "", "busy-after = \"100 ms\"")]);
     let mut tool = robot.tool(Duration::from_secs(60));
     robot.begin(&mut tool, "probe.0", WORK, &(600_000_u64,));
-    wait("it is busy", || place.say(&["list"]).ok().contains("busy").then_some(()));
+    until("it is busy", || place.say(&["list"]).ok().contains("busy"));
     for words in [
         &["call", "probe.0", "count", "1", "--timeout", "0.3"][..],
         &["call", "probe.0", "status", "--timeout", "0.3"],
@@ -119,16 +112,13 @@ fn a_more_important_module_may_subscribe_and_is_warned_if_it_calls() {
         ),
         &probe("probe.0", "rate-hz = 50", ""),
     ]);
-    let checked = place.say(&["check", config.to_str().unwrap()]).ok();
-    assert!(checked.contains("subscribes    probe.0\n"), "{checked}");
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    place.say(&["check", config.to_str().unwrap()]).ok_with(["subscribes    probe.0\n"]);
+    let (_launch, _robot) = place.launched_from(&config);
     wait("it hears", || place.say(&["call", "hearer.0", "heard"]).ok().trim().parse::<u64>().unwrap().checked_sub(1));
     let log = || place.say(&["log", "--module", "hearer.0"]).out;
     assert!(!log().contains("it calls"), "{}", log());
     place.say(&["call", "hearer.0", "call"]).ok();
-    wait("it is warned", || log().contains("it calls probe.0, and its `calls` says that it only").then_some(()));
+    until("it is warned", || log().contains("it calls probe.0, and its `calls` says that it only"));
 }
 
 /// Hears a less important one.
@@ -158,10 +148,6 @@ impl Hearing for Hearer {
     }
 }
 
-#[derive(Deserialize)]
-#[serde(crate = "rohrpost::serde", deny_unknown_fields)]
-struct NoSettings {}
-
 impl Module for Hearer {
     type Settings = NoSettings;
     type Interfaces = HearingInterface;
@@ -188,8 +174,5 @@ impl Module for Hearer {
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Hearer>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Hearer>();
 }

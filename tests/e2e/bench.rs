@@ -1,6 +1,6 @@
 //! `rohrpost bench local`. Its sentence for other computers is tested beside its code, its measurements in `benches`.
 
-use crate::harness::{OUTPUT, Place, probe};
+use crate::harness::{OUTPUT, Place, json_lines, probe};
 use rohrpost_testbed::report::has_two_processors;
 use serde_json::Value;
 
@@ -14,7 +14,7 @@ fn the_self_test_has_all_figures() {
     }
     let place = Place::new();
     let said = place.say(&["bench", "local", "--json"]);
-    let lines: Vec<Value> = said.ok().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines = json_lines(&said.ok());
     assert_eq!(lines.first().unwrap()["case"], "environment");
     assert_eq!(lines.last().unwrap()["case"], "environment-after");
     for (case, floor) in CASES {
@@ -43,8 +43,7 @@ fn a_running_robot_is_not_disturbed_and_the_user_is_told() {
     if !has_two_processors() {
         return;
     }
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let pid = robot.pid("probe.0");
     let said = place.say(&["bench", "local"]);
     assert!(said.err.starts_with("warning: ") && said.err.contains("is launched on this computer"), "{said:?}");
@@ -52,6 +51,5 @@ fn a_running_robot_is_not_disturbed_and_the_user_is_told() {
     let rows = said.out.lines().filter(|line| line.starts_with(" blocking ") || line.starts_with(" spinning ")).count();
     assert_eq!((said.code, rows), (Some(0), 8), "{said:?}");
     assert_eq!(robot.pid("probe.0"), pid);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

@@ -1,7 +1,7 @@
 //! Traffic through a TCP router, between systems and to each node of a LAN, and the cost of a killed TCP router.
 //! Refused programs: `beyond_strangers`.
 
-use crate::harness::{halt, probe, signal, wait};
+use crate::harness::{assert_has, halt, probe, signal, times, until, wait};
 use crate::systems::{OPEN, SEALED, SYSTEMS, Systems, check_crossing, configured};
 use nix::sys::signal::Signal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +18,7 @@ fn check_lists(systems: &Systems) {
         assert!(is_there, "no {module} by {by} at {node}:\n{list}");
     }
     systems.says("north", &["stop", "tcp.255"]).ok();
-    wait("south is away", || (systems.client("south")["state"] != "up").then_some(()));
+    until("south is away", || systems.client("south")["state"] != "up");
     for node in SYSTEMS {
         let list = systems.says(node, &["list"]).ok();
         assert!(list.contains("modules at the TCP router are not known: "), "{node}:\n{list}");
@@ -31,23 +31,15 @@ fn calls_and_data_cross_from_system_to_system() {
     let Some(systems) = Systems::launched(OPEN) else { return };
     check_crossing(&systems);
     for nobodys in ["2.probe.7.0", "9.probe.0.0"] {
-        let told = systems.says("north", &["call", nobodys, "count", "1"]).fails();
-        assert!(told.contains("no router knows a way there"), "{told}");
+        systems.says("north", &["call", nobodys, "count", "1"]).fails_with(["no router knows a way there"]);
     }
     systems.says("south", &["stop", "probe.0"]).ok();
-    let told = systems.says("north", &["call", "2.probe.0.0", "count", "1"]).fails();
-    assert!(told.contains("2.probe.0.0 does not run; start it in system 2"), "{told}");
+    let said = systems.says("north", &["call", "2.probe.0.0", "count", "1"]);
+    said.fails_with(["2.probe.0.0 does not run; start it in system 2"]);
     let shown = systems.says("north", &["net"]).ok();
-    for words in ["TCP router", "up", "node south of south", "node north of north", "takes part"] {
-        assert!(shown.contains(words), "no `{words}` in:\n{shown}");
-    }
+    assert_has(&shown, ["TCP router", "up", "node south of south", "node north of north", "takes part"]);
     check_lists(&systems);
     systems.stop();
-}
-
-/// How often the TCP router is killed: for a long run, `ROHRPOST_KILLS=100 cargo test --test e2e beyond::a_tcp_router`.
-fn kills() -> u64 {
-    std::env::var("ROHRPOST_KILLS").ok().map_or(3, |kills| kills.parse().unwrap())
 }
 
 /// Packages of each class of a client, by outcome.
@@ -67,7 +59,8 @@ fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
     let north = systems.robot("north");
     let clients = || SYSTEMS.map(|node| (systems.robot(node).pid("tcp.0"), systems.robot(node).pid("probe.0")));
     let (before, mut called, mut answered) = (clients(), 0, 0);
-    for kill in 1..=kills() {
+    // For a long run: `ROHRPOST_KILLS=100 cargo test --test e2e beyond::a_tcp_router`.
+    for kill in 1..=times("ROHRPOST_KILLS", 3) {
         let server = north.pid("tcp.255");
         // Calls are in flight at any moment of it, and beats of both modules all the time.
         let is_killed = AtomicBool::new(false);
@@ -96,11 +89,11 @@ fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
     assert_eq!(clients(), before, "nothing else was started again");
     let record = systems.place.record();
     let mut run: Vec<&str> = record.iter().filter_map(|line| line.split_once(" count ")).map(|(_, of)| of).collect();
-    let times = run.len();
+    let runs = run.len();
     run.sort_unstable();
     run.dedup();
-    assert_eq!(run.len(), times, "each call is run at most once");
-    assert!(answered as usize <= times && times <= called as usize, "{answered} of {called} answered, {times} run");
+    assert_eq!(run.len(), runs, "each call is run at most once");
+    assert!(answered as usize <= runs && runs <= called as usize, "{answered} of {called} answered, {runs} run");
     for node in SYSTEMS {
         // A moment without waiting packages; beats come and go all the time.
         let accounts = || Some(accounts(&systems.client(node))).filter(|accounts| !accounts.is_empty());
@@ -121,12 +114,11 @@ fn check_foreign(systems: &Systems, system: u8, order: &str, certificates: &[&st
     program.wait_for("doubled 21");
     // A certificate names the program before its hello does.
     let name = if certificates.is_empty() { "a program in Python" } else { "node python of system 5" };
-    wait(format!("{module} in the list"), || {
+    until(format!("{module} in the list"), || {
         let list = systems.says("north", &["list"]).ok();
-        list.lines().any(|line| line.starts_with(&module) && line.ends_with(name)).then_some(())
+        list.lines().any(|line| line.starts_with(&module) && line.ends_with(name))
     });
-    let said = systems.says("north", &["call", &module]).ok();
-    assert!(said.contains("double <number: u32> -> u32"), "{said}");
+    systems.says("north", &["call", &module]).ok_with(["double <number: u32> -> u32"]);
 }
 
 #[test]
@@ -136,8 +128,7 @@ fn a_program_written_from_the_page_alone_takes_part_in_both_byte_orders() {
     check_foreign(&systems, 4, "big", &[]);
     systems.stop();
     let Some(systems) = Systems::launched(SEALED) else { return };
-    let file = systems.place.path("python.toml");
-    std::fs::write(&file, configured("python", 5, SEALED)).unwrap();
+    let file = systems.place.write("python.toml", configured("python", 5, SEALED));
     systems.place.say(&["keys", "new", file.to_str().unwrap()]).ok();
     check_foreign(&systems, 5, "big", &["certificates", "python.system-5"]);
     systems.stop();
@@ -149,17 +140,17 @@ fn a_program_of_the_own_system_that_the_file_does_not_know_is_reached_by_its_nam
     let Some(systems) = Systems::launched(OPEN) else { return };
     let mut program = systems.foreign("1.96.7.0", "little", &[]);
     program.wait_for("takes part");
-    wait("probe.7 in the list", || {
+    until("probe.7 in the list", || {
         let list = systems.says("north", &["list"]).ok();
-        list.lines().any(|line| line.starts_with("probe.7 ") && line.ends_with("a program in Python")).then_some(())
+        list.lines().any(|line| line.starts_with("probe.7 ") && line.ends_with("a program in Python"))
     });
     assert_eq!(systems.says("north", &["call", "probe.7", "double", "21"]).ok(), "42\n");
     program.wait_for("doubled 21");
     let told = systems.says("north", &["call", "probe.8", "double", "21"]).fails();
     assert!(told.contains("the configuration has no module `probe.8`"), "nobody hosts it: {told}");
     for module in ["probe.7", "2.probe.0.0"] {
-        let told = systems.says("north", &["hz", module, "--count", "1"]).fails();
-        assert!(told.contains("is beyond this system's nodes") && told.contains("`rohrpost echo"), "{told}");
+        let said = systems.says("north", &["hz", module, "--count", "1"]);
+        said.fails_with(["is beyond this system's nodes", "`rohrpost echo"]);
     }
     systems.stop();
 }
@@ -172,16 +163,14 @@ fn each_node_of_a_lan_is_reached_from_beyond_and_the_lan_goes_on_without_the_tcp
         systems.launch(node);
     }
     for node in ["north", "arm", "south"] {
-        wait(format!("{node} takes part"), || (systems.client(node)["state"] == "up").then_some(()));
+        until(format!("{node} takes part"), || systems.client(node)["state"] == "up");
     }
     assert_eq!(systems.says("south", &["call", "1.probe.1.0", "count", "1"]).ok(), "1\n", "on the arm");
     assert_eq!(systems.says("south", &["call", "1.probe.0.0", "count", "2"]).ok(), "1\n");
     assert_eq!(systems.says("arm", &["call", "2.probe.0.0", "count", "3"]).ok(), "1\n");
     systems.says("north", &["stop", "tcp.255"]).ok();
-    wait("the arm has noticed", || (systems.client("arm")["state"] != "up").then_some(()));
-    wait("a call over the LAN", || {
-        (systems.says("north", &["call", "probe.1", "count", "4"]).code == Some(0)).then_some(())
-    });
+    until("the arm has noticed", || systems.client("arm")["state"] != "up");
+    until("a call over the LAN", || systems.says("north", &["call", "probe.1", "count", "4"]).code == Some(0));
     systems.stop();
 }
 
@@ -202,12 +191,12 @@ fn a_package_to_all_systems_comes_once_to_each_whatever_the_path() {
         let robot = systems.robot(node);
         let mut tool = robot.tool(Duration::from_secs(1));
         robot.begin(&mut tool, "255.probe.1.0", crate::probe::COUNT, &(number,));
-        wait(format!("both count what came from {node}"), || (times(number) >= 2).then_some(()));
+        until(format!("both count what came from {node}"), || times(number) >= 2);
         tool.close();
         // Packages by either path would arrive after a duplicate.
         for (further, module) in [(1, "1.probe.1.0"), (2, "2.probe.1.0")] {
             let counted = || systems.says(node, &["call", module, "count", &(number + further).to_string()]).code;
-            wait(format!("{module} counts from {node}"), || (counted() == Some(0)).then_some(()));
+            until(format!("{module} counts from {node}"), || counted() == Some(0));
         }
         assert_eq!(times(number), 2, "once in each system, from {node}: {:?}", systems.place.record());
     }
@@ -215,7 +204,7 @@ fn a_package_to_all_systems_comes_once_to_each_whatever_the_path() {
     halt(systems.robot("north").pid("tcp.255"));
     let mut tool = systems.robot("north").tool(Duration::from_secs(1));
     systems.robot("north").begin(&mut tool, "255.probe.1.0", crate::probe::COUNT, &(400_u32,));
-    wait("arm counts", || (times(400) == 1).then_some(()));
+    until("arm counts", || times(400) == 1);
     tool.close();
     signal(systems.robot("north").pid("tcp.255"), Signal::SIGCONT);
     systems.stop();

@@ -1,6 +1,6 @@
 //! Accepted and refused programs at a TCP router: certificates, versions of TLS, digests. Both sides report the reason.
 
-use crate::harness::{Place, probe, wait};
+use crate::harness::{Place, probe, repository, until, wait};
 use crate::process::Running;
 use crate::systems::{NODES, OPEN, SEALED, SYSTEMS, Systems, check_crossing, configured};
 
@@ -17,15 +17,11 @@ context.wrap_socket(socket.create_connection(('ADDRESS', 21119), timeout=10))
 fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     let Some(mut systems) = Systems::launched(SEALED) else { return };
     check_crossing(&systems);
-    let said = systems.python(&["-c", &OLD_TLS.replace("ADDRESS", NODES[0].1)]).said();
+    let said = systems.python("south", &["-c", &OLD_TLS.replace("ADDRESS", NODES[0].1)]).said();
     assert!(said.err.contains("PROTOCOL_VERSION"), "{said:?}");
-    wait("the TCP router says why", || {
-        systems.says("north", &["net"]).out.contains("an older TLS than 1.3").then_some(())
-    });
+    until("the TCP router says why", || systems.says("north", &["net"]).out.contains("an older TLS than 1.3"));
     // South's certificates are new, by another authority.
-    let (_, mut south, robot) = systems.nodes.pop().unwrap();
-    drop(robot);
-    south.stop();
+    systems.network.halt("south");
     let config = systems.config("south");
     let text = std::fs::read_to_string(&config).unwrap();
     std::fs::write(&config, text.replace("\"certificates\"", "\"others\"")).unwrap();
@@ -43,10 +39,10 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
 
 /// The answer of the TCP router to a program of a node's system that asks for these ranges one after the other.
 fn objections(systems: &Systems, node: &str, own: &str, ranges: &[&str]) -> Vec<String> {
-    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/e2e/python/hijack.py");
+    let page = repository("tests/e2e/python/hijack.py");
     let digests = systems.robot(node).installation.digest().to_string();
-    let arguments = [&[page, NODES[0].1, "21119", &digests, own], ranges].concat();
-    systems.python(&arguments).said().ok().lines().map(str::to_owned).collect()
+    let arguments = [&[&page, NODES[0].1, "21119", &digests, own], ranges].concat();
+    systems.python("south", &arguments).said().ok().lines().map(str::to_owned).collect()
 }
 
 #[test]
@@ -69,14 +65,13 @@ fn a_program_gets_no_name_of_the_files_nodes_and_no_part_of_what_another_hosts()
 #[test]
 fn a_robot_starts_without_its_certificates_and_takes_part_when_they_are_there() {
     let place = Place::new();
-    let config = place.path("north.toml");
-    std::fs::write(&config, configured("north", 1, SEALED).replace(NODES[0].1, "127.0.0.77")).unwrap();
+    let config = place.write("north.toml", configured("north", 1, SEALED).replace(NODES[0].1, "127.0.0.77"));
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "north", &mut launch);
     let wait_for = |launch: &mut Running, module, state| {
-        wait(format!("{module} is {state}"), || {
+        until(format!("{module} is {state}"), || {
             launch.assert_runs();
-            (robot.state(module) == state).then_some(())
+            robot.state(module) == state
         });
     };
     wait_for(&mut launch, "probe.0", "on");
@@ -85,16 +80,14 @@ fn a_robot_starts_without_its_certificates_and_takes_part_when_they_are_there() 
     for module in ["tcp.255", "tcp.0"] {
         wait_for(&mut launch, module, "on");
     }
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn a_third_with_a_certificate_of_another_installation_takes_no_part_and_both_sides_say_why() {
     let Some(mut systems) = Systems::launched(SEALED) else { return };
     let other = configured("arm", 3, SEALED).replace("installation = \"test\"", "installation = \"other\"");
-    std::fs::write(systems.place.path("arm.toml"), other.replace("\"certificates\"", "\"others\"")).unwrap();
+    systems.place.write("arm.toml", other.replace("\"certificates\"", "\"others\""));
     systems.place.say(&["keys", "new", systems.config("arm").to_str().unwrap()]).ok();
     systems.launch("arm");
     systems.wait_refused("certificate is foreign", "refuses this end's certificate as foreign");

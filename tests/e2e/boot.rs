@@ -1,6 +1,6 @@
 //! Launch as systemd starts it: its notifications to the service manager, and when they stop.
 
-use crate::harness::{Place, probe, signal, state, wait};
+use crate::harness::{Place, probe, state, until};
 use crate::process::Running;
 use nix::sys::ptrace;
 use nix::sys::signal::Signal;
@@ -68,23 +68,20 @@ fn the_manager_hears_that_it_is_ready_alive_and_stopping() {
         let mut manager = Manager::new(socket);
         let slow = probe("probe.1", "slow-ms = 300", "");
         let mut launch = launch(&place, &[&probe("probe.0", "", ""), &slow], &text, 400);
-        wait("it is starting", || manager.has("STATUS=starting the modules of node main").then_some(()));
-        wait("it is ready", || {
+        until("it is starting", || manager.has("STATUS=starting the modules of node main"));
+        until("it is ready", || {
             launch.assert_runs();
-            manager.has("READY=1").then_some(())
+            manager.has("READY=1")
         });
         let robot = place.robot(&place.path("test.toml"), "main", &mut launch);
         assert_eq!((robot.state("probe.0"), robot.state("probe.1")), ("on", "on"), "not before all are on");
         assert!(manager.has("STATUS=2 modules run"), "{:?}", manager.said);
         for count in 1..=3 {
-            wait(format!("ping {count}"), || (manager.pings() >= count).then_some(()));
+            until(format!("ping {count}"), || manager.pings() >= count);
         }
         place.say(&["stop", "probe.1"]).ok();
-        wait("the manager learns that a module is stopped", || {
-            manager.has("STATUS=1 modules run, probe.1 stopped").then_some(())
-        });
+        until("the manager learns that a module is stopped", || manager.has("STATUS=1 modules run, probe.1 stopped"));
         assert!(!manager.has("STOPPING=1"));
-        drop(robot);
         launch.stop();
         assert!(manager.has("STOPPING=1"), "{:?}", manager.said);
         std::fs::remove_file(place.path("record")).unwrap();
@@ -102,7 +99,7 @@ impl Held {
         ptrace::seize(thread, ptrace::Options::empty())?;
         ptrace::interrupt(thread)?;
         let held = Self { thread };
-        wait("the thread stands", || (held.states().0 == 't').then_some(()));
+        until("the thread stands", || held.states().0 == 't');
         Ok(held)
     }
 
@@ -126,15 +123,15 @@ fn a_launch_with_a_hung_loop_is_silent_whatever_its_other_threads_do() {
     let mut manager = Manager::new(UnixDatagram::bind(&path).unwrap());
     let period = Duration::from_millis(200);
     let mut launch = launch(&place, &[&probe("probe.0", "", "")], path.to_str().unwrap(), 200);
-    wait("it pings", || (manager.pings() >= 2).then_some(()));
+    until("it pings", || manager.pings() >= 2);
     // The loop is the main thread's. The end of its child must not be awaited while it is traced.
     let held = match Held::hold(launch.pid()) {
         Ok(held) => held,
         Err(error) => return skipped(&format!("whether a launch that hangs falls silent (ptrace: {error})")),
     };
     manager.hear();
-    let until = Instant::now() + 5 * period;
-    while Instant::now() < until {
+    let deadline = Instant::now() + 5 * period;
+    while Instant::now() < deadline {
         assert_eq!(manager.hear(), 0, "it does not go round, and says that it does");
         std::thread::sleep(period / 10);
     }
@@ -142,7 +139,7 @@ fn a_launch_with_a_hung_loop_is_silent_whatever_its_other_threads_do() {
     assert_eq!(own, 't');
     assert!(!others.is_empty() && others.iter().all(|state| matches!(state, 'S' | 'R')), "{others:?}");
     held.let_go();
-    wait("it pings again", || (manager.hear() > 0).then_some(()));
+    until("it pings again", || manager.hear() > 0);
     launch.stop();
 }
 
@@ -167,17 +164,12 @@ fn a_launch_with_unread_output_goes_on_and_ends_in_order() {
     let mut command = place.command(&["launch", config.to_str().unwrap()]);
     command.env("NOTIFY_SOCKET", &path).env("WATCHDOG_USEC", "200000");
     command.stdout(writer.try_clone().unwrap()).stderr(writer);
-    let mut launch = Running::start(command);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (mut launch, robot) = place.up(command, &config, "main");
     for _ in 0..3 {
-        let pid = robot.pid("probe.0");
-        signal(pid, Signal::SIGKILL);
-        robot.wait_restarted("probe.0", pid);
+        robot.kill("probe.0");
         let pings = manager.pings();
-        wait("it pings", || (manager.pings() > pings).then_some(()));
+        until("it pings", || manager.pings() > pings);
     }
-    drop(robot);
     launch.stop();
     assert!(manager.has("STOPPING=1"), "{:?}", manager.said);
     place.assert_empty();
@@ -191,7 +183,6 @@ fn a_manager_that_cannot_be_told_anything_stops_no_robot() {
     let mut launch = launch(&place, &[&probe("probe.0", "", "")], &long, 200);
     let robot = place.robot(&place.path("test.toml"), "main", &mut launch);
     robot.wait_on(&mut launch);
-    drop(robot);
     launch.stop();
     let warning = format!("no word to the service manager: NOTIFY_SOCKET={long}: ");
     assert!(launch.err().starts_with(&warning), "{}", launch.err());
@@ -210,11 +201,8 @@ fn a_manager_that_reads_nothing_keeps_no_module_unwatched() {
     // By now its queue is full.
     let full = UnixDatagram::unbound().unwrap();
     full.set_nonblocking(true).unwrap();
-    wait("the queue is full", || full.send_to(b"x", &path).is_err().then_some(()));
-    let pid = robot.pid("probe.0");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("probe.0", pid);
-    drop(robot);
+    until("the queue is full", || full.send_to(b"x", &path).is_err());
+    robot.kill("probe.0");
     launch.stop();
     drop(socket);
 }
@@ -237,9 +225,9 @@ fn what_it_says_to_the_journal_begins_with_its_urgency() {
     assert!(read().contains("<3>module probe.0 did not become ready: ended with 3"), "{}", read());
 
     let mut running = launch("");
-    wait("it runs", || read().contains("<5>node main of test runs: 1 module\n").then_some(()));
+    until("it runs", || read().contains("<5>node main of test runs: 1 module\n"));
     place.say(&["call", "probe.0", "leave", "3"]).ok();
-    wait("it says so", || read().contains("<5>probe.0 ended with 3").then_some(()));
+    until("it says so", || read().contains("<5>probe.0 ended with 3"));
     running.signal(Signal::SIGTERM);
     assert_eq!(running.end().code(), Some(1));
     assert!(read().contains("<3>probe.0 failed for good: ended with 3"), "{}", read());
@@ -258,8 +246,7 @@ fn systemd_understands_the_unit_that_ships() {
     let text = std::fs::read_to_string(unit).unwrap();
     let text =
         text.replace("/usr/local/bin/rohrpost", env!("CARGO_BIN_EXE_rohrpost")).replace("User=robot", "User=root");
-    let file = place.path("rohrpost@main.service");
-    std::fs::write(&file, text).unwrap();
+    let file = place.write("rohrpost@main.service", text);
     let said = Command::new("systemd-analyze").args(["verify", "--man=no"]).arg(&file).output().unwrap();
     let words = String::from_utf8_lossy(&said.stderr);
     let ours: Vec<&str> = words.lines().filter(|line| line.contains("rohrpost")).collect();

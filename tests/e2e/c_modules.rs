@@ -1,12 +1,10 @@
 //! Modules in C, the examples of `clients/c`, beside modules in Rust: compiled as the book says, launched, listed,
 //! called, killed, and with one stream that both read in place.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, program, runs, signal, wait};
+use crate::harness::{NoSettings, OUTPUT, PATIENCE, Place, classes, program, run_if_launched, runs, until, wait};
 use crate::process::Running;
 use crate::terminal::open_pair;
-use nix::sys::signal::Signal;
 use rohrpost::interfaces::CameraInterface;
-use rohrpost::serde::Deserialize;
 use rohrpost::types::Image;
 use rohrpost::{Context, Module, ModuleError, Received, StreamSubscription};
 use rohrpost_mailbox::{Label, Participant, Priority, Shape, Type};
@@ -14,39 +12,20 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::LazyLock;
 
 const PAGE: &str = include_str!("../../docs/src/c.md");
 
-pub(crate) const CLASSES: &str = "
-[classes.thermometer]
-id = 120
-[classes.counter]
-id = 118
-[classes.motor]
-id = 200
-[classes.odometry]
-id = 160
-[classes.laser]
-id = 150
-[classes.camera]
-id = 112
-[classes.looker]
-id = 110
-[classes.viewer]
-id = 108
-[classes.asker]
-id = 106
-[classes.mapper]
-id = 95
-";
+pub(crate) static CLASSES: LazyLock<String> = LazyLock::new(|| {
+    let drivers =
+        "thermometer 120, counter 118, motor 200, odometry 160, laser 150, camera 112, looker 110, viewer 108";
+    classes(&format!("{drivers}, asker 106, mapper 95"))
+});
 
 /// Not a test: a module that launch starts. Run as a test it ends at once.
 #[test]
 fn module() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Looker>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Looker>();
 }
 
 /// Looks at a camera's pictures in Rust.
@@ -60,10 +39,6 @@ trait Looking {
     fn jumps(&mut self) -> u64;
 }
 
-#[derive(Deserialize)]
-#[serde(crate = "rohrpost::serde", deny_unknown_fields)]
-struct LookerSettings {}
-
 struct Looker {
     pictures: StreamSubscription<Image>,
     seen: u64,
@@ -73,10 +48,10 @@ struct Looker {
 }
 
 impl Module for Looker {
-    type Settings = LookerSettings;
+    type Settings = NoSettings;
     type Interfaces = LookingInterface;
 
-    fn new(_: LookerSettings, context: &mut Context) -> Result<Self, ModuleError> {
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         Ok(Self {
             pictures: context.subscribe_stream(CameraInterface::IMAGE, "camera.0")?,
             seen: 0,
@@ -127,7 +102,7 @@ pub(crate) fn example(place: &Place, name: &str) -> PathBuf {
 fn book(place: &Place, name: &str) -> PathBuf {
     let fence = format!("```{} {name}\n", name.rsplit_once('.').unwrap().1);
     let code = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no {name}")).split("```").next().unwrap();
-    std::fs::write(place.path(name), code).unwrap();
+    place.write(name, code);
     compiled(place, &place.path(name))
 }
 
@@ -169,19 +144,13 @@ pub(crate) fn said(place: &Place, module: &str, function: &str) -> u64 {
     place.say(&["call", module, function]).ok().trim().parse().unwrap()
 }
 
-fn stop(place: &Place, robot: Robot, launch: &mut Running) {
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
-}
-
 #[test]
 fn modules_in_rust_and_in_c_read_one_stream_in_place_that_a_camera_in_c_writes() {
     let place = Place::new();
     let [camera, viewer] = ["camera", "viewer"].map(|name| format!("{:?}", example(&place, name)));
     let looker = program("c_modules::module");
     let (mut launch, robot) = place.launched(&[
-        CLASSES,
+        &CLASSES,
         &entry("camera.0", &camera, "[module.stream.image]\nrecord = \"256 KiB\"\nkeep = 4"),
         &entry("viewer.0", &viewer, "calls = [\"camera.0\"]"),
         &entry("looker.0", &looker, "calls = [\"camera.0\"]"),
@@ -189,7 +158,7 @@ fn modules_in_rust_and_in_c_read_one_stream_in_place_that_a_camera_in_c_writes()
     let listed = place.say(&["list"]).ok();
     assert!(["camera.0", "viewer.0", "looker.0"].iter().all(|name| listed.contains(name)), "{listed}");
     for module in ["viewer.0", "looker.0"] {
-        wait(format!("{module} sees"), || (seen(&place, module) > 0).then_some(()));
+        until(format!("{module} sees"), || seen(&place, module) > 0);
     }
     let described = place.say(&["call", "viewer.0"]).ok();
     assert!(described.contains("seen -> u64\n      How many pictures it has seen."), "{described}");
@@ -200,17 +169,14 @@ fn modules_in_rust_and_in_c_read_one_stream_in_place_that_a_camera_in_c_writes()
     let streams = place.say(&["stream", "list", "--json"]).json();
     let image = streams["streams"].as_array().unwrap().iter().find(|stream| stream["stream"] == "camera.0").unwrap();
     assert_eq!((&image["readers"], &image["record_bytes"]), (&2.into(), &262_144.into()), "{streams:#}");
-    let refused = place.say(&["send", "viewer.0", "look"]).fails();
-    assert!(refused.contains("look"), "{refused}");
+    place.say(&["send", "viewer.0", "look"]).fails_with(["look"]);
     // Killed, it is started again, and goes on with its stream; so do its readers.
-    let pid = robot.pid("camera.0");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("camera.0", pid);
+    robot.kill("camera.0");
     let before = [seen(&place, "viewer.0"), seen(&place, "looker.0")];
     for (module, before) in ["viewer.0", "looker.0"].into_iter().zip(before) {
-        wait(format!("{module} sees on"), || (seen(&place, module) > before).then_some(()));
+        until(format!("{module} sees on"), || seen(&place, module) > before);
     }
-    stop(&place, robot, &mut launch);
+    place.end(&mut launch);
 }
 
 /// The microcontroller at the other end of a serial line.
@@ -232,7 +198,7 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
     let thermometer = format!("{:?}", book(&place, "thermometer.c"));
     let asker = format!("{:?}", compiled(&place, &client().join("tests/asker.c")));
     let (mut launch, robot) = place.launched(&[
-        CLASSES,
+        &CLASSES,
         &entry("thermometer.0", &thermometer, "settings = { volts-per-degree = 0.02 }"),
         &entry(
             "asker.0",
@@ -270,15 +236,12 @@ fn a_module_in_c_asks_for_all_that_there_is_rightly_and_wrongly() {
             place.say(&["call", "asker.0", word]).ok();
         }
     }
-    let failed = place.say(&["call", "asker.0", "fail"]).fails();
-    assert!(failed.contains("it does not say why"), "{failed}");
+    place.say(&["call", "asker.0", "fail"]).fails_with(["it does not say why"]);
     assert_eq!(robot.state("asker.0"), "error");
     // So launch ends with an error, once it knows.
     let why = "asker.0 is in error: it does not say why";
-    wait("launch tells it", || (launch.out() + &launch.err()).contains(why).then_some(()));
-    drop(robot);
-    launch.signal(Signal::SIGINT);
-    assert_eq!(launch.end().code(), Some(1));
+    until("launch tells it", || (launch.out() + &launch.err()).contains(why));
+    launch.stop_failed();
     place.assert_empty();
 }
 
@@ -289,7 +252,7 @@ fn a_driver_in_c_gives_the_mapper_the_odometry_that_it_makes_of_a_serial_line() 
     let (line, slave, port) = open_pair();
     let map = client().join("../../config/building.map");
     let (mut launch, robot) = place.launched(&[
-        CLASSES,
+        &CLASSES,
         OUTPUT,
         "[[module]]\nname = \"motor.0\"\naliases = [\"odometry.1\", \"laser.0\"]\nbuiltin = \"sim\"\n",
         &format!("settings = {{ map = {map:?}, seed = 1, laser-rate-hz = 20 }}\n"),
@@ -298,31 +261,30 @@ fn a_driver_in_c_gives_the_mapper_the_odometry_that_it_makes_of_a_serial_line() 
         "settings = { laser = \"laser.0\", odometry = \"odometry.0\" }\n",
     ]);
     let mut wheels = Wheels { line, count: 0 };
-    wait("the mapper maps scans by the odometry of C", || {
+    until("the mapper maps scans by the odometry of C", || {
         wheels.turn();
         let counts = place.say(&["call", "mapper.0", "counts"]).ok();
         let mapped = counts.split_once("mapped: ").unwrap().1.split([',', '}']).next().unwrap();
-        (mapped != "0").then_some(())
+        mapped != "0"
     });
-    let at = place.say(&["call", "odometry.0", "get", "odometry"]).ok();
-    assert!(at.contains("pose: {x_m: ") && at.contains("heading_rad: 0}"), "{at}");
+    place.say(&["call", "odometry.0", "get", "odometry"]).ok_with(["pose: {x_m: ", "heading_rad: 0}"]);
     // A parameter with a range of its own, and one that the module itself refuses.
     place.say(&["param", "set", "odometry.0", "count-m", "0.004"]).ok();
-    let refused = place.say(&["param", "set", "odometry.0", "track-m", "20"]).fails();
-    assert!(refused.contains("`track-m` is 20 m, out of range: 0.01..=10 m"), "{refused}");
-    let refused = place.say(&["param", "set", "odometry.0", "port", "/dev/null"]).fails();
-    assert!(refused.contains("the port is opened when the module starts: restart it"), "{refused}");
+    let said = place.say(&["param", "set", "odometry.0", "track-m", "20"]);
+    said.fails_with(["`track-m` is 20 m, out of range: 0.01..=10 m"]);
+    let said = place.say(&["param", "set", "odometry.0", "port", "/dev/null"]);
+    said.fails_with(["the port is opened when the module starts: restart it"]);
     // Whatever the line says: more than a number has room for, and differences of more.
     for counts in ["99999999999999999999 1", "9223372036854775807 0", "-9223372036854775808 0"] {
         writeln!(wheels.line, "{counts}").unwrap();
     }
     writeln!(wheels.line, "no counts").unwrap();
-    wait("a line that cannot be read is told", || {
-        place.say(&["log"]).ok().contains("something that is not two counts").then_some(())
+    until("a line that cannot be read is told", || {
+        place.say(&["log"]).ok().contains("something that is not two counts")
     });
     assert_eq!(robot.state("odometry.0"), "on");
     drop(slave);
-    stop(&place, robot, &mut launch);
+    place.end(&mut launch);
 }
 
 #[test]
@@ -331,17 +293,16 @@ fn the_programs_of_the_book_do_what_it_says() {
     let [thermometer, counter, echo] =
         ["thermometer.c", "counter.cpp", "echo.c"].map(|name| book(&place, name).display().to_string());
     let (mut launch, robot) = place.launched(&[
-        CLASSES,
+        &CLASSES,
         &entry("thermometer.0", &format!("{thermometer:?}"), "settings = { volts-per-degree = 0.02 }"),
         &entry("counter.0", &format!("{counter:?}"), ""),
     ]);
     assert_eq!(place.say(&["call", "thermometer.0", "calibrate", "21.5"]).ok(), "1.5\n");
-    wait("it says what it was told", || {
-        place.say(&["echo", "thermometer.0", "--count", "1"]).ok().ends_with(" 21.5\n").then_some(())
+    until("it says what it was told", || {
+        place.say(&["echo", "thermometer.0", "--count", "1"]).ok().ends_with(" 21.5\n")
     });
-    let bad = place.say(&["call", "thermometer.0", "calibrate", "warm"]).fails();
-    assert!(bad.contains("true_c"), "{bad}");
-    wait("it counts", || place.say(&["echo", "counter.0", "--count", "1"]).ok().ends_with(" 2\n").then_some(()));
+    place.say(&["call", "thermometer.0", "calibrate", "warm"]).fails_with(["true_c"]);
+    until("it counts", || place.say(&["echo", "counter.0", "--count", "1"]).ok().ends_with(" 2\n"));
     let mut command = Command::new(&echo);
     command.arg(&robot.installation.path).arg("main").env("ROHRPOST_DIR", place.memory());
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -364,11 +325,9 @@ fn the_programs_of_the_book_do_what_it_says() {
     drop((sender, participant));
     // When launch dies, whatever killed it, they end as modules in Rust do.
     let all = ["thermometer.0", "counter.0"].map(|name| (robot.name(name), robot.pid(name)));
-    launch.signal(Signal::SIGKILL);
-    launch.end();
-    wait("no module is left", || all.iter().all(|(_, pid)| !runs(*pid)).then_some(()));
+    launch.kill();
+    until("no module is left", || all.iter().all(|(_, pid)| !runs(*pid)));
     assert!(all.iter().all(|(name, pid)| robot.node.last_word_of(*name, *pid).is_none()), "they left in order");
-    drop(robot);
     place.say(&["clean"]).ok();
     place.assert_empty();
 }

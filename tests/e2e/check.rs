@@ -74,7 +74,7 @@ const SAID: [(usize, &str); 12] = [
 
 /// Writes `wrong.toml` with these modules; what is to be told of their lines.
 fn wrong(place: &Place, modules: &str, told: &[(usize, &str)]) -> Vec<String> {
-    let file = place.config_of("wrong", "[nodes.main]", &[RECORDED_CLASSES, modules]);
+    let file = place.config_of("wrong", "[nodes.main]", &[&RECORDED_CLASSES, modules]);
     let text = std::fs::read_to_string(file).unwrap();
     let before = text.strip_suffix(modules).unwrap().lines().count();
     told.iter().map(|(line, said)| format!("wrong.toml:{}: {said}", before + line)).collect()
@@ -141,7 +141,7 @@ fn what_a_file_means_can_be_read_by_programs() {
     let place = Place::new();
     // All keys; the builtin mapper does not know its settings.
     let full = include_str!("../../config/tests/full.toml").replace("builtin = \"mapper\"", "program = \"./mapper\"");
-    std::fs::write(place.path("full.toml"), &full).unwrap();
+    place.write("full.toml", &full);
     let json = place.say(&["check", "full.toml", "--json"]).json();
     assert_eq!((&json["right"], &json["installation"]["name"]), (&true.into(), &"two-computers".into()));
     let base = &json["installation"]["nodes"][0];
@@ -164,11 +164,11 @@ fn what_a_file_means_can_be_read_by_programs() {
     assert_eq!(number(motor), system << 24 | motor["priority"].as_u64().unwrap() << 16);
     assert_eq!((&motor["required"], &motor["optional"]), (&true.into(), &false.into()));
     let larger = full.replace("record = \"8 MiB\"\nkeep = 8", "record = \"1 GiB\"\nkeep = 1000000");
-    std::fs::write(place.path("larger.toml"), larger).unwrap();
+    place.write("larger.toml", larger);
     let notes = place.say(&["check", "larger.toml", "--json"]).json()["notes"].to_string();
     assert!(notes.contains("node base needs 1000009.1 GiB of shared memory, and this computer has "), "{notes}");
     // The opposite of its own declaration.
-    std::fs::write(place.path("sealed.toml"), full.replace("security = \"none\"", "security = \"keys\"")).unwrap();
+    place.write("sealed.toml", full.replace("security = \"none\"", "security = \"keys\""));
     let json_of_sealed = place.say(&["check", "sealed.toml", "--json"]).json();
     assert_eq!(json_of_sealed["installation"]["network"]["security"], "keys");
     let json = place.say(&["check", "full.toml", "--json", "--node", "desk"]).json();
@@ -227,13 +227,13 @@ fn time_slots_are_drawn_and_the_worst_of_each_flow_is_said() {
 fn a_deadline_that_slots_cannot_keep_is_refused_with_what_would() {
     let place = Place::new();
     let demo = |length: &str| include_str!("../../config/demo-tdma.toml").replacen("\"1.2 ms\"", length, 1);
-    std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map"), place.path("building.map")).unwrap();
-    std::fs::write(place.path("short.toml"), demo("\"450 us\"")).unwrap();
+    place.copy("config/building.map");
+    place.write("short.toml", demo("\"450 us\""));
     let told = place.say(&["check", "short.toml"]).fails();
     // Each flow asks for what it needs; the last one waits for all the others.
     let remedies: Vec<&str> = told.lines().filter_map(|line| line.split_once("`length = ")).map(|(_, to)| to).collect();
     assert!(told.contains("lengthen that of `base` at 1 ms (line 47) by") && remedies.len() > 1, "{told}");
     let longest = remedies.iter().map(|remedy| remedy.trim_end_matches('`')).max().unwrap();
-    std::fs::write(place.path("short.toml"), demo(longest)).unwrap();
+    place.write("short.toml", demo(longest));
     place.say(&["check", "short.toml"]).ok();
 }

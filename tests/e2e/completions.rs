@@ -1,6 +1,7 @@
 //! Completions of a shell at the tab key, by the scripts that `rohrpost completions` prints.
 
-use crate::harness::{NETWORK, OUTPUT, Place, probe};
+use crate::harness::{OUTPUT, Place, probe};
+use crate::network::NETWORK;
 use rohrpost_testbed::report::skipped;
 use std::process::Command;
 
@@ -49,8 +50,7 @@ fn words_that_are_no_text_are_no_panic() {
 
 #[test]
 fn bash_offers_what_the_running_node_has() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let all = offered(&place, &["rohrpost", ""]);
     for command in ["check", "launch", "call", "echo", "doctor", "completions"] {
         assert!(all.iter().any(|offer| offer == command), "{command}: {all:?}");
@@ -78,8 +78,7 @@ fn bash_offers_what_the_running_node_has() {
     assert_eq!(offered(&place, &["rohrpost", "call", "probe.0", "get", "be"]), ["beat"]);
     assert_eq!(offered(&place, &["rohrpost", "echo", "probe.0", "si"]), ["silence"]);
     assert_eq!((received("probe.0"), received("output.0")), before, "nobody was sent anything for this");
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
@@ -98,7 +97,7 @@ fn without_a_node_the_named_configuration_is_asked() {
     assert_eq!(offered(&place, &["rohrpost", "check", "arm.toml", "--node", ""]), ["base", "desk"]);
     assert_eq!(offered(&place, &["rohrpost", "check", "ar"]), ["arm.toml"]);
     // A wrong configuration must not disturb the user's typing.
-    std::fs::write(place.path("wrong.toml"), "nonsense").unwrap();
+    place.write("wrong.toml", "nonsense");
     assert_eq!(offered(&place, &["rohrpost", "call", "--config", "wrong.toml", ""]), [""; 0]);
     assert_eq!(offered(&place, &["rohrpost", "new", "pro"]), [""; 0], "a name that there is not yet");
 }

@@ -3,9 +3,9 @@
 //!
 //! Both are this test program itself, as the probe is.
 
+use crate::harness::{NoSettings, run_if_launched};
 use rohrpost::common::{DataHead, HASH, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use rohrpost::schema::Description;
-use rohrpost::serde::Deserialize;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Context, Fault, Module, ModuleError, Name, ToolLink};
 use rohrpost_config::Installation;
@@ -17,10 +17,7 @@ use std::time::{Duration, Instant};
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Conforming>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Conforming>();
 }
 
 /// Not a test: what the suite starts, with the configuration's file. Run as a test it ends at once.
@@ -56,10 +53,6 @@ pub(crate) trait Probing {
     fn beat() -> u64;
 }
 
-#[derive(Deserialize)]
-#[serde(crate = "rohrpost::serde", deny_unknown_fields)]
-struct Nothing {}
-
 struct Conforming {
     counted: u64,
     again: u64,
@@ -67,10 +60,10 @@ struct Conforming {
 }
 
 impl Module for Conforming {
-    type Settings = Nothing;
+    type Settings = NoSettings;
     type Interfaces = ProbingInterface;
 
-    fn new(_: Nothing, context: &mut Context) -> Result<Self, ModuleError> {
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         context.set_period(Duration::from_millis(50));
         Ok(Self { counted: 0, again: 0, beats: 0 })
     }
@@ -107,11 +100,11 @@ struct Client {
     begun: Vec<u32>,
 }
 
-fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn unhex(text: &str) -> Vec<u8> {
+pub(crate) fn unhex(text: &str) -> Vec<u8> {
     (0..text.len()).step_by(2).map(|at| u8::from_str_radix(&text[at..at + 2], 16).unwrap()).collect()
 }
 

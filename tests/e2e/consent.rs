@@ -5,10 +5,11 @@ use crate::harness::{OUTPUT, Place, program};
 use crate::hostile_texts::{HOSTILE, assert_plain, structure};
 use crate::process::Said;
 use crate::record::recording_that_says;
+use crate::recordings;
 use crate::replayed_others::bag_that_says;
 use crate::seer::entry;
 use rohrpost::schema::Schema;
-use rohrpost_recording::{ChannelSpec, Options, Reader, Session, Writer};
+use rohrpost_recording::{ChannelSpec, Reader};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -22,10 +23,9 @@ fn recorded(place: &Place) -> PathBuf {
     let mut words = ["/bin/sh", "-c", script.as_str(), "sh", HOSTILE].map(toml_text).join(", ");
     words.push_str(&program("seer::module").replacen('[', ", ", 1));
     let entry = entry(0, "clock").replace(&program("seer::module"), &format!("[{words}"));
-    let (mut launch, robot) = launched(place, &format!("{entry}{RECORD}"));
+    let (mut launch, _robot) = launched(place, &format!("{entry}{RECORD}"));
     let file = recording(place, 1);
     wait_journaled(&file, "seer.0", 2);
-    drop(robot);
     launch.stop();
     std::fs::remove_file(place.path("ran")).unwrap();
     file
@@ -43,10 +43,7 @@ fn toml_text(text: &str) -> String {
 
 /// The journals of a file, in one that says it was made with this configuration.
 fn with_configuration(place: &Place, file: &Path, text: &str) -> PathBuf {
-    let configuration = BTreeMap::from([("test.toml".to_owned(), text.to_owned())]);
-    let session = Session { node: "main".into(), configuration, ..Session::default() };
-    let options = Options { leave_bytes: 0, ..Options::new(place.path(""), "other") };
-    let mut writer = Writer::start(options, session).unwrap();
+    let mut writer = recordings::begin(place, "other", recordings::session("main", "test.toml", text));
     let mut reader = Reader::open(file).unwrap();
     while let Some((channel, message)) = reader.next().unwrap() {
         if let (Some(number), Some(ty)) = (channel.texts.get("number"), &channel.ty) {
@@ -55,8 +52,7 @@ fn with_configuration(place: &Place, file: &Path, text: &str) -> PathBuf {
             writer.write(id, &message).unwrap();
         }
     }
-    writer.finish().1.unwrap();
-    place.path("other-0001.mcap")
+    recordings::end(place, "other", writer)
 }
 
 /// Exact replay with these words behind the file.
@@ -96,8 +92,7 @@ fn a_recorded_command_is_shown_and_runs_when_the_user_says_so() {
     let said = exact(&place, &file, &["--config", own]);
     assert!(said.code == Some(1) && said.out.contains(&format!("the same as in {own}")), "{said:?}");
     let text = std::fs::read_to_string(own).unwrap();
-    let other = place.path("other.toml");
-    std::fs::write(&other, text.replace("/bin/sh", "/bin/true").replace("\"clock\"", "\"map\"")).unwrap();
+    let other = place.write("other.toml", text.replace("/bin/sh", "/bin/true").replace("\"clock\"", "\"map\""));
     let other = other.to_str().unwrap();
     let said = exact(&place, &file, &["--config", other]);
     assert!(said.out.contains(&format!("{other} has another command: /bin/true -c ")), "{said:?}");
@@ -171,8 +166,7 @@ fn packed_by(place: &Place, text: &str) -> PathBuf {
     record(15, vec![0; 4]);
     record(2, vec![0; 20]);
     bytes.extend(mcap::MAGIC);
-    let path = place.path("packed.mcap");
-    std::fs::write(&path, bytes).unwrap();
+    let path = place.write("packed.mcap", bytes);
     path
 }
 

@@ -1,6 +1,6 @@
 //! A person restarts, stops and starts single modules of a node that runs.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, until, wait};
 use nix::sys::signal::Signal;
 use rohrpost::CallError;
 use rohrpost_launch::launcher::{AskLaunch, ChildState, ControlError, Phase};
@@ -15,10 +15,9 @@ fn child(place: &crate::harness::Robot, module: &str) -> ChildState {
 
 #[test]
 fn a_module_is_restarted_stopped_and_started_and_nobody_else_notices() {
-    let place = Place::new();
     let keys = "restart = { policy = \"on-failure\", at-most = 1, within = \"60 s\" }";
-    let (mut launch, robot) =
-        place.launched(&[OUTPUT, &probe("probe.0", "", keys), &probe("probe.1", "", "calls = [\"probe.0\"]")]);
+    let (place, mut launch, robot) =
+        Place::running(&[OUTPUT, &probe("probe.0", "", keys), &probe("probe.1", "", "calls = [\"probe.0\"]")]);
     let other = robot.pid("probe.1");
     for _ in 0..3 {
         let pid = robot.pid("probe.0");
@@ -30,8 +29,7 @@ fn a_module_is_restarted_stopped_and_started_and_nobody_else_notices() {
     assert_eq!(place.say(&["list", "--json"]).json()["modules"][1]["restarts"], 0, "its policy was not asked");
     assert!(place.say(&["start", "probe.0"]).fails().contains("probe.0 runs already; `rohrpost restart probe.0`"));
 
-    let said = place.say(&["stop", "probe.0"]).ok();
-    assert!(said.contains("probe.0 is stopped (ended with 0 when told to)"), "{said}");
+    place.say(&["stop", "probe.0"]).ok_with(["probe.0 is stopped (ended with 0 when told to)"]);
     assert!(robot.process("probe.0").is_none());
     assert!(
         place
@@ -43,8 +41,7 @@ fn a_module_is_restarted_stopped_and_started_and_nobody_else_notices() {
     assert!(place.say(&["stop", "probe.0"]).fails().contains("probe.0 is stopped already; `rohrpost start probe.0`"));
     assert_eq!(child(&robot, "probe.0").phase, Phase::Stopped);
 
-    let said = place.say(&["start", "probe.0"]).ok();
-    assert!(said.contains("probe.0 runs and is on"), "{said}");
+    place.say(&["start", "probe.0"]).ok_with(["probe.0 runs and is on"]);
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
     // A restart by a person does not count: one restart by its policy is left.
     let pid = robot.pid("probe.0");
@@ -59,13 +56,12 @@ fn a_module_is_restarted_stopped_and_started_and_nobody_else_notices() {
 
 #[test]
 fn a_restarted_module_is_on_if_it_was_on() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", ""), &probe("probe.1", "", "start = \"off\"")]);
+    let (place, mut launch, robot) =
+        Place::running(&[&probe("probe.0", "", ""), &probe("probe.1", "", "start = \"off\"")]);
     place.say(&["call", "probe.0", "off"]).ok();
     place.say(&["call", "probe.1", "on"]).ok();
     for (module, state) in [("probe.0", "off"), ("probe.1", "on")] {
-        let said = place.say(&["restart", module]).ok();
-        assert!(said.contains(&format!("{module} runs and is {state}")), "{said}");
+        place.say(&["restart", module]).ok_with([&format!("{module} runs and is {state}")]);
         assert_eq!(robot.state(module), state);
     }
     for (module, state) in [("probe.0", "on"), ("probe.1", "off")] {
@@ -78,18 +74,14 @@ fn a_restarted_module_is_on_if_it_was_on() {
 
 #[test]
 fn one_that_hangs_on_its_way_out_keeps_nobody_waiting_and_a_second_word_ends_it() {
-    let place = Place::new();
-    let (mut launch, robot) =
-        place.launched(&[&probe("probe.0", "", "stop-within = \"20 min\""), &probe("probe.1", "", "")]);
+    let (place, mut launch, robot) =
+        Place::running(&[&probe("probe.0", "", "stop-within = \"20 min\""), &probe("probe.1", "", "")]);
     halt(robot.pid("probe.0"));
     assert_eq!(place.say(&["restart", "probe.0", "--no-wait"]).ok(), "probe.0 is being started\n");
     assert_eq!(child(&robot, "probe.0").phase, Phase::Stopping);
-    let pid = robot.pid("probe.1");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("probe.1", pid);
+    robot.kill("probe.1");
     assert_eq!(child(&robot, "probe.0").phase, Phase::Stopping);
-    let late = place.say(&["stop", "probe.0", "--timeout", "0.2"]).fails();
-    assert!(late.contains("probe.0 is still stopping after 200ms"), "{late}");
+    place.say(&["stop", "probe.0", "--timeout", "0.2"]).fails_with(["probe.0 is still stopping after 200ms"]);
     // The first signal stops modules in order; a second one, moments later, kills the rest.
     wait("launch ends", || {
         launch.signal(Signal::SIGINT);
@@ -104,12 +96,10 @@ fn one_that_hangs_on_its_way_out_keeps_nobody_waiting_and_a_second_word_ends_it(
 
 #[test]
 fn a_hung_module_is_killed_and_comes_back() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "stop-within = \"300 ms\"")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "stop-within = \"300 ms\"")]);
     let pid = robot.pid("probe.0");
     halt(pid);
-    let said = place.say(&["restart", "probe.0"]).ok();
-    assert!(said.contains("probe.0 runs and is on"), "{said}");
+    place.say(&["restart", "probe.0"]).ok_with(["probe.0 runs and is on"]);
     assert_ne!(robot.pid("probe.0"), pid);
     let out = launch.stop();
     assert!(out.contains("probe.0 did not stop within 300ms; killed"), "{out}");
@@ -117,13 +107,12 @@ fn a_hung_module_is_killed_and_comes_back() {
 
 #[test]
 fn hung_modules_wait_beside_each_other_at_the_end() {
-    let place = Place::new();
     let (hung, within) = (6, Duration::from_millis(2000));
     let probes: Vec<String> = (0..hung)
         .map(|n| probe(&format!("probe.{n}"), "", &format!("stop-within = \"{} ms\"", within.as_millis())))
         .collect();
     let probes: Vec<&str> = probes.iter().map(String::as_str).collect();
-    let (mut launch, robot) = place.launched(&probes);
+    let (place, mut launch, robot) = Place::running(&probes);
     robot.pids().into_iter().for_each(halt);
     let told = Instant::now();
     let out = launch.stop();
@@ -134,8 +123,7 @@ fn hung_modules_wait_beside_each_other_at_the_end() {
 
 #[test]
 fn one_that_failed_for_good_is_started_by_a_person_and_is_forgiven() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = \"never\"")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "restart = \"never\"")]);
     place.say(&["call", "probe.0", "leave", "3"]).ok();
     launch.wait_for("probe.0 ended with 3");
     let failed = child(&robot, "probe.0");
@@ -153,21 +141,18 @@ fn a_module_that_does_not_come_back_is_told_with_its_own_words() {
     let ends = format!("exit-at-start = 3, wait-for = {:?}", place.path("end"));
     let (mut launch, robot) =
         place.launched(&[&probe("probe.0", &ends, "restart = \"never\""), &probe("probe.1", "", "")]);
-    std::fs::write(place.path("end"), "").unwrap();
+    place.write("end", "");
     let said = place.say(&["restart", "probe.0"]).fails();
     assert!(said.contains("probe.0 does not run: ended with 3"), "{said}");
     assert!(said.contains("a probe was asked to end with 3"), "{said}");
     assert_eq!(robot.state("probe.1"), "on");
-    launch.signal(Signal::SIGINT);
-    assert_eq!(launch.end().code(), Some(1), "it failed for good");
+    launch.stop_failed();
 }
 
 #[test]
 fn orders_that_cannot_be_carried_out_say_why() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
-    let told = place.say(&["restart", "probe.7"]).fails();
-    assert!(told.contains("no module `probe.7`"), "{told}");
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
+    place.say(&["restart", "probe.7"]).fails_with(["no module `probe.7`"]);
     let mut tool = robot.tool(PATIENCE);
     for text in ["probe.7", "nonsense", "tool.0"] {
         let refused = tool.restart(tool.launcher(), text);
@@ -179,24 +164,20 @@ fn orders_that_cannot_be_carried_out_say_why() {
     assert!(matches!(tool.start(tool.launcher(), "probe.0"), Err(CallError::Module(_, ControlError::Running(_)))));
     tool.close();
     // Any tool can read launch's interface, and call it.
-    let listing = place.say(&["call", "tool.0"]).ok();
-    assert!(listing.contains("restart <module: text>"), "{listing}");
+    place.say(&["call", "tool.0"]).ok_with(["restart <module: text>"]);
     place.say(&["call", "tool.0", "stop", "probe.0"]).ok();
-    wait("probe.0 is stopped", || (child(&robot, "probe.0").phase == Phase::Stopped).then_some(()));
+    until("probe.0 is stopped", || child(&robot, "probe.0").phase == Phase::Stopped);
     launch.stop();
 }
 
 #[test]
 fn without_a_launch_it_is_told_that_nobody_watches() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let config = place.path("test.toml");
-    launch.signal(Signal::SIGKILL);
-    launch.end();
-    wait("its module has ended", || robot.process("probe.0").is_none().then_some(()));
-    let told = place.say(&["restart", "probe.0", "--config", config.to_str().unwrap()]).fails();
-    assert!(told.contains("no launch watches over probe.0") && told.contains("rohrpost launch"), "{told}");
-    drop(robot);
+    launch.kill();
+    until("its module has ended", || robot.process("probe.0").is_none());
+    let said = place.say(&["restart", "probe.0", "--config", config.to_str().unwrap()]);
+    said.fails_with(["no launch watches over probe.0", "rohrpost launch"]);
     place.say(&["clean"]).ok();
     place.assert_empty();
 }

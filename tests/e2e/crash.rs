@@ -1,6 +1,6 @@
 //! Launch dies: no module drives on, and cleaning removes the remains without harm to living processes.
 
-use crate::harness::{PATIENCE, Place, Robot, halt, probe, runs, signal, wait};
+use crate::harness::{PATIENCE, Place, Robot, halt, probe, runs, signal, until, wait};
 use crate::probe::COUNT;
 use crate::process::Running;
 use nix::sys::signal::{Signal, kill};
@@ -8,67 +8,52 @@ use nix::unistd::Pid;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 fn wait_gone(pids: &[u32]) {
-    wait(format!("{pids:?} end"), || (!pids.iter().any(|pid| runs(*pid))).then_some(()));
+    until(format!("{pids:?} end"), || !pids.iter().any(|pid| runs(*pid)));
 }
 
 /// Launches again and sees it work.
 fn again(place: &Place) -> (Running, Robot) {
     let config = place.path("test.toml");
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
-    (launch, robot)
+    place.launched_from(&config)
 }
 
 #[test]
 fn modules_switch_off_and_end_when_launch_is_killed() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", ""), &probe("probe.1", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", ""), &probe("probe.1", "", "")]);
     let pids = robot.pids();
-    launch.signal(Signal::SIGKILL);
-    launch.end();
+    launch.kill();
     wait_gone(&pids);
     for module in ["probe.0", "probe.1"] {
         assert_eq!(place.record().iter().filter(|line| **line == format!("{module} off")).count(), 1);
     }
-    let told = place.say(&["list"]).fails();
-    assert!(told.contains("no node runs here"), "{told}");
-    drop(robot);
-    let (mut launch, robot) = again(&place);
+    place.say(&["list"]).fails_with(["no node runs here"]);
+    let (mut launch, _robot) = again(&place);
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn what_waited_for_the_last_run_does_not_drive_the_next() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = { backoff = \"10 min\" }")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "restart = { backoff = \"10 min\" }")]);
     let mut tool = robot.tool(PATIENCE);
     signal(robot.pid("probe.0"), Signal::SIGKILL);
     launch.wait_for("probe.0 was killed by signal 9; starts again in 600s");
     robot.begin(&mut tool, "probe.0", COUNT, &(1u32,));
     assert_eq!(robot.waiting("probe.0"), 1);
-    launch.signal(Signal::SIGKILL);
-    launch.end();
+    launch.kill();
     tool.close();
-    drop(robot);
-    let (mut launch, robot) = again(&place);
+    let (mut launch, _robot) = again(&place);
     assert_eq!(place.say(&["call", "probe.0", "count", "2"]).ok(), "1\n");
     assert_eq!(place.counted(), [2]);
-    drop(robot);
     launch.stop();
 }
 
 #[test]
 fn a_module_that_was_stopped_when_launch_died_is_woken_and_switches_off() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", ""), &probe("probe.1", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", ""), &probe("probe.1", "", "")]);
     let (pids, stopped) = (robot.pids(), robot.pid("probe.0"));
     halt(stopped);
-    launch.signal(Signal::SIGKILL);
-    launch.end();
+    launch.kill();
     // Mostly the kernel does this, preceded by SIGHUP; not if the new parent is in the same session.
     let _ = kill(Pid::from_raw(stopped as i32), Signal::SIGCONT);
     wait_gone(&pids);
@@ -78,26 +63,21 @@ fn a_module_that_was_stopped_when_launch_died_is_woken_and_switches_off() {
 #[test]
 fn the_next_launch_ends_a_module_that_would_not_end() {
     for stopped in [false, true] {
-        let place = Place::new();
         let keys = "stop-within = \"300 ms\"";
-        let (mut launch, robot) =
-            place.launched(&[&probe("probe.0", "ignore-stop = true", keys), &probe("probe.1", "", keys)]);
+        let (place, mut launch, robot) =
+            Place::running(&[&probe("probe.0", "ignore-stop = true", keys), &probe("probe.1", "", keys)]);
         let (pid, other) = (robot.pid("probe.0"), robot.pid("probe.1"));
-        launch.signal(Signal::SIGKILL);
-        launch.end();
+        launch.kill();
         wait_gone(&[other]);
         assert!(runs(pid));
         if stopped {
             halt(pid);
         }
-        drop(robot);
         let (mut launch, robot) = again(&place);
         assert!(!runs(pid));
         launch.wait_for(&format!("probe.0 (process {pid}) ran already, left over from an earlier launch; ended"));
         assert_ne!(robot.pid("probe.0"), pid);
-        drop(robot);
-        launch.stop();
-        place.assert_empty();
+        place.end(&mut launch);
     }
 }
 
@@ -106,14 +86,10 @@ fn clean_removes_what_a_crash_left_and_nothing_that_lives() {
     let place = Place::new();
     assert!(place.say(&["clean"]).ok().contains("nothing to clean"));
     let dead = place.config_of("dead", "[nodes.main]", &[&probe("probe.0", "", "")]);
-    let mut launch = place.launch(&dead);
-    let robot = place.robot(&dead, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (mut launch, robot) = place.launched_from(&dead);
     let pids = robot.pids();
-    launch.signal(Signal::SIGKILL);
-    launch.end();
+    launch.kill();
     wait_gone(&pids);
-    drop(robot);
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
     let before = robot.node.mailboxes().unwrap();
     let said = place.say(&["clean"]).ok();
@@ -122,19 +98,16 @@ fn clean_removes_what_a_crash_left_and_nothing_that_lives() {
     assert!(!place.memory().join("dead.main").exists());
     assert_eq!(robot.node.mailboxes().unwrap(), before);
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn clean_keeps_the_packages_of_a_module_that_is_about_to_start_again() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = { backoff = \"1 s\" }")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "restart = { backoff = \"1 s\" }")]);
     let mut tool = robot.tool(PATIENCE);
     let pid = robot.pid("probe.0");
     signal(pid, Signal::SIGKILL);
-    wait("probe.0 is dead", || robot.process("probe.0").is_none().then_some(()));
+    until("probe.0 is dead", || robot.process("probe.0").is_none());
     let call = robot.begin(&mut tool, "probe.0", COUNT, &(5u32,));
     assert!(place.say(&["clean"]).ok().contains("removed 0 mailboxes"));
     let counted: u64 = tool.link.wait(call, |bytes| rohrpost::wire::from_bytes(bytes)).unwrap();
@@ -145,14 +118,11 @@ fn clean_keeps_the_packages_of_a_module_that_is_about_to_start_again() {
 
 #[test]
 fn clean_leaves_modules_alone_that_outlived_their_launch() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "ignore-stop = true", "stop-within = \"300 ms\"")]);
+    let (place, mut launch, robot) =
+        Place::running(&[&probe("probe.0", "ignore-stop = true", "stop-within = \"300 ms\"")]);
     let pid = robot.pid("probe.0");
-    launch.signal(Signal::SIGKILL);
-    launch.end();
-    drop(robot);
-    let said = place.say(&["clean"]).ok();
-    assert!(said.contains("is in use"), "{said}");
+    launch.kill();
+    place.say(&["clean"]).ok_with(["is in use"]);
     assert!(runs(pid));
     signal(pid, Signal::SIGKILL);
     wait_gone(&[pid]);

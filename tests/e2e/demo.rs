@@ -1,6 +1,6 @@
 //! The demo, as its user sees it.
 
-use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, runs, wait};
+use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, runs, until, wait};
 use crate::process::Running;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -20,7 +20,7 @@ fn number(text: &str, words: &str) -> u64 {
 #[test]
 fn the_simulated_robot_maps_and_says_what_came_of_it() {
     let place = Place::new();
-    let mut demo = Running::start(place.command(&["demo", "--no-gui", "--quiet"]));
+    let mut demo = place.start(&["demo", "--no-gui", "--quiet"]);
     wait("it has mapped", || {
         demo.assert_runs();
         let said = place.say(&["call", "mapper.0", "counts", "--json"]);
@@ -118,8 +118,7 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
         assert!(is_known, "{row}");
     }
     place.assert_empty();
-    let said = place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails();
-    assert!(said.contains("use --nodes 3"), "{said}");
+    place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails_with(["use --nodes 3"]);
 }
 
 #[test]
@@ -156,8 +155,8 @@ fn a_log_is_played_to_its_end_and_nothing_of_it_is_lost() {
 #[test]
 fn a_packed_log_plays_like_the_plain_one() {
     let place = Place::new();
-    let said = place.say(&["demo", "--log", &format!("{LOG}.gz"), "--speed", "100", "--no-gui", "--quiet"]).ok();
-    assert!(said.contains("log: 20 scans and 100 odometry lines played, 20 discarded"), "{said}");
+    let said = place.say(&["demo", "--log", &format!("{LOG}.gz"), "--speed", "100", "--no-gui", "--quiet"]);
+    said.ok_with(["log: 20 scans and 100 odometry lines played, 20 discarded"]);
 }
 
 #[test]
@@ -166,12 +165,12 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let place = Place::new();
         let arguments: &[&str] =
             if log { &["demo", "--no-gui", "--log", LOG, "--speed", "0.01"] } else { &["demo", "--no-gui"] };
-        let mut demo = Running::start(place.command(arguments));
-        wait("the demo is on", || {
+        let mut demo = place.start(arguments);
+        until("the demo is on", || {
             let list = place.say(&["list", "--json"]);
             let all_on =
                 |list: serde_json::Value| list["modules"].as_array().unwrap().iter().all(|m| m["state"] == "on");
-            (list.code == Some(0) && all_on(list.json())).then_some(())
+            list.code == Some(0) && all_on(list.json())
         });
         let list = place.say(&["list", "--json"]).json();
         let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
@@ -202,8 +201,7 @@ fn mistakes_are_told_before_anything_runs() {
         (&["demo", "--log", LOG, "--speed=-3", "--no-gui"], "speed"),
         (&["demo", "--seconds=-1", "--no-gui"], "-1 s is no time to wait"),
     ] {
-        let told = place.say(arguments).fails();
-        assert!(told.contains(words), "{arguments:?}: no `{words}` in: {told}");
+        place.say(arguments).fails_with([words]);
         place.assert_empty();
     }
 }
@@ -214,7 +212,7 @@ fn the_configuration_of_the_present_folder_is_taken_if_there_is_one() {
     let config = place.config(&[&probe("probe.0", "", "")]);
     std::fs::create_dir(place.path("config")).unwrap();
     std::fs::rename(config, place.path("config/demo.toml")).unwrap();
-    let mut demo = Running::start(place.command(&["demo"]));
+    let mut demo = place.start(&["demo"]);
     wait("the probe runs", || place.say(&["call", "probe.0", "count", "1"]).code.filter(|code| *code == 0));
     demo.signal(Signal::SIGTERM);
     assert!(demo.end().success());
@@ -240,8 +238,7 @@ fn a_demo_without_its_gui_names_the_file_that_people_know() {
 #[test]
 fn a_log_that_is_none_is_told_and_fails() {
     let place = Place::new();
-    let log = place.path("poem.txt");
-    std::fs::write(&log, "Fest gemauert in der Erden\nsteht die Form, aus Lehm gebrannt.\n").unwrap();
+    let log = place.write("poem.txt", "Fest gemauert in der Erden\nsteht die Form, aus Lehm gebrannt.\n");
     let said = place.say(&["demo", "--log", log.to_str().unwrap(), "--no-gui", "--quiet"]);
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.out.contains("is it a CARMEN log?"), "{said:?}");
@@ -284,13 +281,12 @@ fn the_files_of_a_killed_demo_are_removed_and_those_of_one_that_runs_are_not() {
         let (mut runs_on, _) = demo_on(&place, &temp);
         assert_eq!(folders(&temp).len(), 2, "the first one runs, and the second leaves it alone");
 
-        killed.signal(Signal::SIGKILL);
-        killed.end();
+        killed.kill();
         // Some have ended by themselves.
         for pid in &pids {
             let _ = kill(Pid::from_raw(*pid as i32), Signal::SIGKILL);
         }
-        wait("all its processes have ended", || (!pids.iter().any(|pid| runs(*pid))).then_some(()));
+        until("all its processes have ended", || !pids.iter().any(|pid| runs(*pid)));
         assert!(left[0].exists(), "nobody has removed it yet");
 
         let mut command = killed_place.command(remover);

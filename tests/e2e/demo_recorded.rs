@@ -1,7 +1,6 @@
 //! `rohrpost demo --record`: one file with all of the demo.
 
 use crate::harness::{Place, signal, wait};
-use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost_recording::{Info, info};
 
@@ -41,7 +40,7 @@ fn is_drawn(told: &Info) -> bool {
 /// The demo, until it has recorded something of all, and drawn it; its last words.
 fn recorded(place: &Place, further: &[&str]) -> String {
     let arguments = [&["demo", "--no-gui", "--quiet", "--record", "out.mcap"], further].concat();
-    let mut demo = Running::start(place.command(&arguments));
+    let mut demo = place.start(&arguments);
     wait("all is recorded", || {
         demo.assert_runs();
         let said = place.say(&["call", "logd.0", "channels", "0", "--json"]);
@@ -72,8 +71,8 @@ fn all_of_a_demo_is_in_one_file() {
         assert!(channel.is_some_and(|channel| channel.messages > 0), "{topic}: {told:?}");
     }
     assert!(is_drawn(&told), "{told:?}");
-    let said = place.say(&["record", "info", "out.mcap"]).ok();
-    assert!(said.contains("foxglove.RawImage protobuf, drawn of camera.0/image, reduced to 64 KiB"), "{said}");
+    let said = place.say(&["record", "info", "out.mcap"]);
+    said.ok_with(["foxglove.RawImage protobuf, drawn of camera.0/image, reduced to 64 KiB"]);
     assert!(told.configuration["demo.toml"].contains("[record]"));
     assert!(!place.path("out.mcap.part").exists());
     let before = std::fs::read(&file).unwrap();
@@ -84,13 +83,12 @@ fn all_of_a_demo_is_in_one_file() {
         (&["--record", "none/out.mcap"], "none/out.mcap.part: cannot make this folder"),
         (&["--record", "new.mcap", "--nodes", "3"], "--record records a demo of one node"),
     ] {
-        let said = place.say(&[&["demo", "--no-gui", "--quiet"], arguments].concat()).fails();
-        assert!(said.contains(words), "{arguments:?}: {said}");
+        place.say(&[&["demo", "--no-gui", "--quiet"], arguments].concat()).fails_with([words]);
     }
     assert_eq!(std::fs::read(&file).unwrap(), before);
     std::fs::create_dir(place.path("new.mcap.part")).unwrap();
-    let said = place.say(&["demo", "--no-gui", "--quiet", "--record", "new.mcap"]).fails();
-    assert!(said.contains("new.mcap.part: another demo records there, or was killed"), "{said}");
+    let said = place.say(&["demo", "--no-gui", "--quiet", "--record", "new.mcap"]);
+    said.fails_with(["new.mcap.part: another demo records there, or was killed"]);
     recorded(&place, &["--overwrite"]);
     assert!(info(&file).unwrap().first_ns > told.last_ns, "it is another one");
     let said = place.say(&["replay", "out.mcap", "--rate", "20", "--no-gui", "--quiet"]).ok();
@@ -115,7 +113,7 @@ fn a_log_is_recorded_as_well() {
 #[test]
 fn a_recorder_that_was_started_again_leaves_one_file_too() {
     let place = Place::new();
-    let mut demo = Running::start(place.command(&["demo", "--no-gui", "--quiet", "--record", "out.mcap"]));
+    let mut demo = place.start(&["demo", "--no-gui", "--quiet", "--record", "out.mcap"]);
     let written = || {
         let said = place.say(&["call", "logd.0", "recording", "--json"]);
         let state: serde_json::Value = serde_json::from_str(&said.out).ok()?;

@@ -2,7 +2,7 @@
 //! run on it; those of README in `readme.rs`. Numbers and times differ from run to run, and how the kernel schedules
 //! from user to user; headers, rows and words do not.
 
-use crate::harness::{Place, wait};
+use crate::harness::{Place, until};
 use std::fs;
 use std::path::Path;
 
@@ -212,8 +212,7 @@ fn what_the_page_of_tools_shows_is_what_they_print() {
     fs::create_dir(place.path("config")).unwrap();
     fs::copy(folder.join("building.map"), place.path("config/building.map")).unwrap();
     let text = fs::read_to_string(folder.join("demo.toml")).unwrap();
-    let config = place.path("config/demo.toml");
-    fs::write(&config, &text).unwrap();
+    place.write("config/demo.toml", &text);
     // The same with a file for parameters, whether this user may have real time, and the bridge was built, or not.
     let saves = place.path("config/saves.toml");
     let text = text.replace("rohrpost-gui-bridge\"", "not-there\"");
@@ -221,8 +220,8 @@ fn what_the_page_of_tools_shows_is_what_they_print() {
     fs::write(&saves, format!("parameters = \"tuned.toml\"\n{text}")).unwrap();
     let mut launch = place.launch(&saves);
     let robot = place.robot(&saves, "main", &mut launch);
-    wait("all are on", || (robot.state("pilot.0") == "on").then_some(()));
-    wait("the log has all", || place.say(&["log"]).out.contains("pilot.0: is on").then_some(()));
+    until("all are on", || robot.state("pilot.0") == "on");
+    until("the log has all", || place.say(&["log"]).out.contains("pilot.0: is on"));
     let (_, screen) = shown.iter().find(|(command, _)| command == "top").unwrap();
     for line in screen.iter().filter(|line| line.starts_with(['─', '?']) || line.contains(" module ")) {
         assert!(SCREEN.contains(line), "{PAGE} shows of `top` a line that it does not have: {line}");

@@ -1,7 +1,7 @@
 //! `rohrpost doctor` on the computer that runs the tests. Findings of other computers are tested beside its code.
 
-use crate::harness::{NETWORK, OUTPUT, Place, probe, wait};
-use nix::sys::signal::Signal;
+use crate::harness::{OUTPUT, Place, probe, until};
+use crate::network::NETWORK;
 use serde_json::Value;
 
 /// Its findings; the exit code reports a bad one.
@@ -155,15 +155,12 @@ fn waking_up_is_measured() {
 
 #[test]
 fn what_a_crash_left_is_found() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let findings = examine(&place, &[]);
     assert_eq!(find(&findings, "node")["state"], "ok");
     assert!(find(&findings, "node")["is"].as_str().unwrap().contains(&format!("launched by process {}", launch.pid())));
-    launch.signal(Signal::SIGKILL);
-    launch.end();
-    wait("its modules end", || robot.pids().is_empty().then_some(()));
-    drop(robot);
+    launch.kill();
+    until("its modules end", || robot.pids().is_empty());
     let findings = examine(&place, &[]);
     assert_eq!(
         (&find(&findings, "node")["state"], &find(&findings, "node")["fix"]),

@@ -1,8 +1,9 @@
 //! Exact replay: the demo's modules repeat what they did on a loaded and disturbed node, and whatever differs is found.
 
-use crate::harness::{Place, RECORDED_CLASSES, Robot, halt, signal, wait};
+use crate::harness::{Place, RECORDED_CLASSES, Robot, halt, json_lines, signal, times, until};
 use crate::load::Load;
 use crate::process::{Running, Said};
+use crate::recordings::messages;
 use crate::seer::{NOTHING, OTHER_BUILD, OTHER_QUESTIONS, entry};
 use nix::sys::signal::Signal;
 use rohrpost_modules::journal::Piece;
@@ -53,16 +54,11 @@ leave-free = "0 B"
 flush = "20 ms"
 "#;
 
-const BUILDING: &str = include_str!("../../config/building.map");
-
 pub(crate) fn launched(place: &Place, modules: &str) -> (Running, Robot) {
-    let config = place.config(&[RECORDED_CLASSES, LOGD, modules]);
-    std::fs::write(place.path("building.map"), BUILDING).unwrap();
-    std::fs::write(place.path("vision.map"), "far").unwrap();
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
-    (launch, robot)
+    let config = place.config(&[&RECORDED_CLASSES, LOGD, modules]);
+    place.copy("config/building.map");
+    place.write("vision.map", "far");
+    place.launched_from(&config)
 }
 
 /// Seers with these sources, all with journals.
@@ -87,7 +83,7 @@ pub(crate) fn recording(place: &Place, number: u32) -> PathBuf {
 /// What each run of each module came to.
 pub(crate) fn replayed(place: &Place, file: &Path, modules: &[&str]) -> Vec<Value> {
     let said = replay(place, file, modules, &[]);
-    said.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    json_lines(&said.out)
 }
 
 fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str)]) -> Said {
@@ -100,12 +96,7 @@ fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str
 /// Messages of a journal in a file that is being written, if they are so.
 pub(crate) fn count(file: &Path, module: &str, is_so: impl Fn(&[u8]) -> bool) -> usize {
     let topic = format!("{module}/journal");
-    let Ok(mut reader) = rohrpost_recording::Reader::open(file) else { return 0 };
-    let mut count = 0;
-    while let Ok(Some((channel, message))) = reader.next() {
-        count += usize::from(channel.topic == topic && is_so(message.data));
-    }
-    count
+    messages(file, |channel, message| (channel.topic == topic && is_so(message.data)).then_some(())).len()
 }
 
 fn journaled(file: &Path, module: &str) -> usize {
@@ -119,7 +110,7 @@ fn begun(file: &Path, module: &str) -> usize {
 
 pub(crate) fn wait_journaled(file: &Path, module: &str, more: usize) {
     let before = journaled(file, module);
-    wait(format!("{module} goes on"), || (journaled(file, module) >= before + more).then_some(()));
+    until(format!("{module} goes on"), || journaled(file, module) >= before + more);
 }
 
 #[test]
@@ -148,7 +139,6 @@ fn simulator_pilot_and_mapper_of_a_loaded_and_disturbed_run_repeat_exactly() {
     robot.wait_restarted("pilot.0", pilot);
     ["motor.0", "mapper.0", "pilot.0"].iter().for_each(|module| wait_journaled(&file, module, 20));
     drop(load);
-    drop(robot);
     launch.stop();
 
     // The book shows a command of the pilot as it is told.
@@ -160,8 +150,7 @@ fn simulator_pilot_and_mapper_of_a_loaded_and_disturbed_run_repeat_exactly() {
         assert!(listed.lines().any(|told| is_it(&told)), "{line}");
     }
 
-    let times = std::env::var(REPLAYS).ok().and_then(|times| times.parse().ok()).unwrap_or(2);
-    for _ in 0..times {
+    for _ in 0..times(REPLAYS, 2) {
         let runs = replayed(&place, &file, &[]);
         let mut modules: Vec<&str> = runs.iter().map(|run| run["module"].as_str().unwrap()).collect();
         modules.sort_unstable();
@@ -183,10 +172,9 @@ fn simulator_pilot_and_mapper_of_a_loaded_and_disturbed_run_repeat_exactly() {
 fn rules_that_are_kept_repeat_and_those_that_are_broken_are_found_or_refused() {
     let place = Place::new();
     let sources = ["clock", "hash-order", "taken-in", "map", "descriptor", "thread", "link"];
-    let (mut launch, robot) = seers(&place, &sources);
+    let (mut launch, _robot) = seers(&place, &sources);
     let file = recording(&place, 1);
     ["seer.0", "seer.1", "seer.2", "seer.3"].iter().for_each(|module| wait_journaled(&file, module, 5));
-    drop(robot);
     launch.stop();
 
     let runs = replayed(&place, &file, &[]);
@@ -208,7 +196,7 @@ fn rules_that_are_kept_repeat_and_those_that_are_broken_are_found_or_refused() {
         assert_eq!((&run["result"], &run["events"]), (&"refused".into(), &events.into()), "{run:#}");
         assert!(run["why"].as_str().unwrap().contains(words), "{run:#}");
     }
-    std::fs::write(place.path("vision.map"), "near").unwrap();
+    place.write("vision.map", "near");
     let run = &replayed(&place, &file, &["seer.3"])[0];
     assert_eq!(run["result"], "refused");
     assert!(run["why"].as_str().unwrap().contains("vision.map is not the file that it was"), "{run:#}");
@@ -224,7 +212,7 @@ fn rules_that_are_kept_repeat_and_those_that_are_broken_are_found_or_refused() {
 fn a_descriptor_is_repeated_without_it_and_what_is_read_past_the_journal_is_found() {
     let place = Place::new();
     let listener = UnixListener::bind(place.path("port")).unwrap();
-    let (mut launch, robot) = seers(&place, &["port", "beside"]);
+    let (mut launch, _robot) = seers(&place, &["port", "beside"]);
     let file = recording(&place, 1);
     let mut ports = [0, 1].map(|_| listener.accept().unwrap().0);
     for round in 0..20 {
@@ -236,7 +224,6 @@ fn a_descriptor_is_repeated_without_it_and_what_is_read_past_the_journal_is_foun
         }
     }
     ["seer.0", "seer.1"].iter().for_each(|module| wait_journaled(&file, module, 5));
-    drop(robot);
     launch.stop();
     drop((listener, ports));
     std::fs::remove_file(place.path("port")).unwrap();
@@ -264,12 +251,11 @@ fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     assert_eq!(place.say(&["call", "seer.0", "add", "7"]).ok().trim(), "7");
     wait_journaled(&file, "seer.0", 2);
     place.say(&["call", "seer.1", "fail"]).ok();
-    wait("it failed", || (robot.state("seer.1") == "error").then_some(()));
+    until("it failed", || robot.state("seer.1") == "error");
     let panicking = robot.pid("seer.2");
     place.say(&["call", "seer.2", "panic"]);
     robot.wait_restarted("seer.2", panicking);
     wait_journaled(&file, "seer.2", 2);
-    drop(robot);
     // Not a success, since one is in error.
     launch.signal(Signal::SIGINT);
     launch.end();
@@ -295,10 +281,9 @@ fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
 #[test]
 fn a_build_that_asks_for_another_mailbox_or_for_other_records_is_told_with_both_questions() {
     let place = Place::new();
-    let (mut launch, robot) = seers(&place, &["asking"]);
+    let (mut launch, _robot) = seers(&place, &["asking"]);
     let file = recording(&place, 1);
     wait_journaled(&file, "seer.0", 2);
-    drop(robot);
     launch.stop();
 
     let run = &replayed(&place, &file, &[])[0];
@@ -328,10 +313,9 @@ fn a_module_that_fails_or_panics_while_it_is_made_is_told_with_its_reason() {
     let file = recording(&place, 1);
     let modules = ["seer.0", "seer.1"];
     modules.iter().for_each(|module| wait_journaled(&file, module, 2));
-    std::fs::write(place.path("vision.map"), NOTHING).unwrap();
+    place.write("vision.map", NOTHING);
     modules.iter().for_each(|module| signal(robot.pid(module), Signal::SIGKILL));
-    modules.iter().for_each(|module| wait("it began again", || (begun(&file, module) > 1).then_some(())));
-    drop(robot);
+    modules.iter().for_each(|module| until("it began again", || begun(&file, module) > 1));
     launch.signal(Signal::SIGINT);
     launch.end();
 
@@ -349,13 +333,12 @@ fn a_module_that_fails_or_panics_while_it_is_made_is_told_with_its_reason() {
 #[test]
 fn a_journal_that_began_before_its_recording_is_refused_until_the_files_are_merged() {
     let place = Place::new();
-    let (mut launch, robot) = seers(&place, &["clock"]);
+    let (mut launch, _robot) = seers(&place, &["clock"]);
     let [first, second] = [1, 2].map(|number| recording(&place, number));
     wait_journaled(&first, "seer.0", 3);
     place.say(&["call", "logd.0", "off"]).ok();
     place.say(&["call", "logd.0", "on"]).ok();
     wait_journaled(&second, "seer.0", 3);
-    drop(robot);
     launch.stop();
 
     let run = &replayed(&place, &first, &[])[0];
@@ -368,6 +351,6 @@ fn a_journal_that_began_before_its_recording_is_refused_until_the_files_are_merg
     place.say(&["record", "merge", one, other, "-o", to]).ok();
     let run = &replayed(&place, &all, &[])[0];
     assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
-    let told = place.say(&["replay", "--exact", all.to_str().unwrap(), "seer.7"]).fails();
-    assert!(told.contains("no journal of seer.7; name the module in [record]"), "{told}");
+    let said = place.say(&["replay", "--exact", all.to_str().unwrap(), "seer.7"]);
+    said.fails_with(["no journal of seer.7; name the module in [record]"]);
 }

@@ -1,36 +1,18 @@
 //! Exact replay of a module that reads long records which are recorded anyhow: its journal has their sums.
 
 use crate::exact::{recording, replayed, seers_recorded, wait_journaled};
-use crate::harness::{Place, Robot, halt, signal, wait};
+use crate::harness::{Place, Robot, halt, signal, until};
+use crate::recordings::messages;
 use crate::seer::PICTURE_BYTES;
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::StreamId;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Messages of a topic, and their bytes.
-fn recorded(file: &Path, topic: &str) -> (usize, usize) {
-    let mut reader = rohrpost_recording::Reader::open(file).unwrap();
-    let (mut count, mut bytes) = (0, 0);
-    while let Some((channel, message)) = reader.next().unwrap() {
-        if channel.topic == topic && !channel.is_repeated() {
-            (count, bytes) = (count + 1, bytes + message.data.len());
-        }
-    }
-    (count, bytes)
-}
-
-/// Sequences of pictures in files, in their order.
-fn pictures(files: &[PathBuf]) -> Vec<u32> {
-    let mut sequences = Vec::new();
-    for file in files {
-        let mut reader = rohrpost_recording::Reader::open(file).unwrap();
-        while let Some((channel, message)) = reader.next().unwrap() {
-            if channel.topic == "seer.0/picture" && !channel.is_repeated() {
-                sequences.push(message.sequence);
-            }
-        }
-    }
-    sequences
+/// Messages of a topic: their sequences and lengths.
+fn recorded(file: &Path, topic: &str) -> Vec<(u32, usize)> {
+    messages(file, |channel, message| {
+        (channel.topic == topic && !channel.is_repeated()).then_some((message.sequence, message.data.len()))
+    })
 }
 
 /// Pictures that were ever written.
@@ -42,25 +24,25 @@ fn written(robot: &Robot) -> u64 {
 #[test]
 fn long_records_are_taken_out_of_the_recording_and_a_missing_one_is_refused() {
     let place = Place::new();
-    let (mut launch, robot) = seers_recorded(&place, &["pictures"], "streams = [\"seer.0/picture\"]\n");
+    let (mut launch, _robot) = seers_recorded(&place, &["pictures"], "streams = [\"seer.0/picture\"]\n");
     let file = recording(&place, 1);
     let is_recorded = || place.say(&["call", "logd.0", "channels", "0"]).ok().contains("seer.0/picture");
-    wait("its pictures are recorded", || is_recorded().then_some(()));
+    until("its pictures are recorded", || is_recorded());
     // From now on it writes pictures, and reads each twice.
     place.say(&["call", "seer.0", "add", "1"]).ok();
     wait_journaled(&file, "seer.0", 20);
-    drop(robot);
     launch.stop();
 
-    let (pictures, picture_bytes) = recorded(&file, "seer.0/picture");
-    let (_, journal_bytes) = recorded(&file, "seer.0/journal");
+    let lengths = |topic| recorded(&file, topic).into_iter().map(|(_, bytes)| bytes).collect::<Vec<_>>();
+    let (pictures, picture_bytes) = (lengths("seer.0/picture").len(), lengths("seer.0/picture").iter().sum::<usize>());
+    let journal_bytes: usize = lengths("seer.0/journal").iter().sum();
     assert!(pictures > 5 && picture_bytes >= pictures * PICTURE_BYTES, "{pictures} pictures, {picture_bytes} B");
     assert!(journal_bytes < picture_bytes / 10, "{journal_bytes} B of the journal, {picture_bytes} B of pictures");
     let run = &replayed(&place, &file, &[])[0];
     assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
     assert!(run["outputs"].as_u64() >= Some(2 * pictures as u64), "{pictures} pictures, {run:#}");
-    let listed = place.say(&["replay", "--exact", file.to_str().unwrap(), "seer.0", "--list"]).ok();
-    assert!(listed.contains("it is given what is recorded anyhow: record 0 of stream 2 of 1.110.0.0, "), "{listed}");
+    let said = place.say(&["replay", "--exact", file.to_str().unwrap(), "seer.0", "--list"]);
+    said.ok_with(["it is given what is recorded anyhow: record 0 of stream 2 of 1.110.0.0, "]);
 
     let part = place.path("part.mcap");
     let [from, to] = [&file, &part].map(|path| path.to_str().unwrap());
@@ -78,7 +60,7 @@ fn a_recorder_that_starts_again_goes_on_behind_what_is_in_a_file() {
     let (mut launch, robot) = seers_recorded(&place, &["pictures"], "streams = [\"seer.0/picture\"]\n");
     let [first, second, third] = [1, 2, 3].map(|number| recording(&place, number));
     let is_recorded = || place.say(&["call", "logd.0", "channels", "0"]).ok().contains("seer.0/picture");
-    wait("its pictures are recorded", || is_recorded().then_some(()));
+    until("its pictures are recorded", || is_recorded());
     place.say(&["call", "seer.0", "add", "1"]).ok();
     wait_journaled(&first, "seer.0", 20);
 
@@ -86,24 +68,24 @@ fn a_recorder_that_starts_again_goes_on_behind_what_is_in_a_file() {
     let (killed, seer) = (robot.pid("logd.0"), robot.pid("seer.0"));
     signal(killed, Signal::SIGKILL);
     let before = written(&robot);
-    wait("pictures that nobody records", || (written(&robot) > before + 5).then_some(()));
+    until("pictures that nobody records", || written(&robot) > before + 5);
     halt(seer);
     robot.wait_restarted("logd.0", killed);
-    wait("its pictures are recorded again", || is_recorded().then_some(()));
+    until("its pictures are recorded again", || is_recorded());
     signal(seer, Signal::SIGCONT);
     wait_journaled(&second, "seer.0", 20);
     let recovered = rohrpost_recording::recovered_path(&first);
-    wait("what was killed is made whole", || recovered.exists().then_some(()));
+    until("what was killed is made whole", || recovered.exists());
     halt(seer);
     place.say(&["restart", "logd.0"]).ok();
-    wait("its pictures are recorded by the third", || is_recorded().then_some(()));
+    until("its pictures are recorded by the third", || is_recorded());
     signal(seer, Signal::SIGCONT);
     wait_journaled(&third, "seer.0", 20);
-    drop(robot);
     launch.stop();
 
     let files = [recovered, second, third];
-    let sequences = pictures(&files);
+    let pictures = files.iter().flat_map(|file| recorded(file, "seer.0/picture"));
+    let sequences: Vec<u32> = pictures.map(|(sequence, _)| sequence).collect();
     assert!(sequences.len() > 15, "{sequences:?}");
     assert_eq!(sequences, (0..sequences.len() as u32).collect::<Vec<_>>(), "nothing twice, and nothing missing");
     let all = place.path("all.mcap");

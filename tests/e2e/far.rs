@@ -1,17 +1,14 @@
 //! Nodes that only the TCP router reaches, such as a robot's laptop: all nodes of the file in namespaces of their own,
 //! `base` and `arm` on a LAN, `far` on a link of its own to `base`.
 
-use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, signal, wait};
+use crate::harness::{PATIENCE, Place, head, probe, until, wait};
+use crate::network::{launched_all, nodes};
 use crate::process::{Running, Said};
 use crate::systems::CLASSES;
-use nix::sys::signal::Signal;
 use rohrpost_mailbox::{SystemClock, monotonic_ns};
 use std::path::PathBuf;
 
 const FAR: &str = "[nodes.far]\nnetwork = \"tcp\"\ntools = [32, 47]\n";
-const TWO: &str = "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\n\
-    tools = [16, 31]\n\
-                   [time]\nsource = \"master\"\n";
 const OPEN: &str = "[network]\nsecurity = \"none\"\n[tcp]\nsecurity = \"none\"\n";
 const SEALED: &str = "[network]\nsecurity = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertificates = \"certificates\"\n";
 
@@ -35,26 +32,16 @@ impl Field {
             modules.push(probe("probe.1", "", "node = \"arm\""));
         }
         let text = format!(
-            "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n\
-             {CLASSES}{FAR}{lan}{security}address = \"192.168.7.1\"\nserver = \
-             \"base\"\n{}",
+            "{}{FAR}{lan}{security}address = \"192.168.7.1\"\nserver = \"base\"\n{}",
+            head(CLASSES),
             modules.concat()
         );
-        let config = place.path("robot.toml");
-        std::fs::write(&config, text).unwrap();
+        let config = place.write("robot.toml", text);
         if security == SEALED {
             place.say(&["keys", "new", config.to_str().unwrap()]).ok();
         }
-        let mut launch = Running::start(place.command(&["launch", config.to_str().unwrap(), "--all"]));
-        let is_there = wait("all nodes run", || {
-            if launch.ended().is_some() {
-                assert!(lacks_namespaces(&launch.err()), "{}\n{}", launch.out(), launch.err());
-                return Some(false);
-            }
-            let runs = |node: &&str| launch.out().contains(&format!("node {node} of test runs"));
-            nodes.iter().all(runs).then_some(true)
-        });
-        is_there.then(|| Self { place, config, launch, nodes: nodes.to_vec() })
+        let launch = launched_all(&place, &config, nodes, &[])?;
+        Some(Self { place, config, launch, nodes: nodes.to_vec() })
     }
 
     fn says(&self, node: &str, arguments: &[&str]) -> Said {
@@ -68,9 +55,7 @@ impl Field {
 
     /// The result of a call, as soon as one succeeds.
     fn calls(&self, node: &str, module: &str) {
-        wait(format!("{module} from {node}"), || {
-            (self.says(node, &["call", module, "count", "1"]).code == Some(0)).then_some(())
-        });
+        until(format!("{module} from {node}"), || self.says(node, &["call", module, "count", "1"]).code == Some(0));
     }
 
     fn heard(&self, module: &str) -> usize {
@@ -81,9 +66,9 @@ impl Field {
     /// Waits until data arrive both ways between `base` and `far`.
     fn wait_heard(&self) {
         let before = ["probe.0", "probe.2"].map(|module| self.heard(module));
-        wait("beats both ways", || {
+        until("beats both ways", || {
             let now = ["probe.0", "probe.2"].map(|module| self.heard(module));
-            (now[0] > before[0] && now[1] > before[1]).then_some(())
+            now[0] > before[0] && now[1] > before[1]
         });
     }
 
@@ -103,9 +88,9 @@ impl Field {
             let line = list.lines().find(|line| line.starts_with(&format!("{module} "))).unwrap_or_default();
             assert!(line.contains(" on "), "{module}:\n{list}");
         }
-        wait("far is up", || {
+        until("far is up", || {
             let net = self.shows(&["net"]).out;
-            net.lines().any(|line| line.starts_with("far ") && line.contains(" up ")).then_some(())
+            net.lines().any(|line| line.starts_with("far ") && line.contains(" up "))
         });
         let time = || self.shows(&["time"]);
         let told = wait("far has the time", || Some(time()).filter(|told| told.code == Some(0))).ok();
@@ -120,12 +105,12 @@ impl Field {
         let (off, bound) = (base.ns.abs_diff(far.ns), base.error + far.error);
         assert!(u128::from(off) <= bound.as_nanos(), "{off} ns off, at most {bound:?} as they say");
         assert!(error_ns > 0 && bound < PATIENCE, "{error_ns}");
-        wait("beats are in the graph", || {
+        until("beats are in the graph", || {
             let graph = self.shows(&["graph", "--seconds", "1"]).ok();
             let edge = |from: &str, to: &str| {
                 graph.lines().any(|line| line.split_whitespace().take(2).eq([from, to]) && line.contains("beat"))
             };
-            (edge("probe.0", "probe.2") && edge("probe.2", "probe.0")).then_some(())
+            edge("probe.0", "probe.2") && edge("probe.2", "probe.0")
         });
     }
 
@@ -140,6 +125,11 @@ impl Field {
         self.launch.stop();
         self.place.assert_empty();
     }
+}
+
+/// A LAN of `base` and `arm`.
+fn two() -> String {
+    nodes([("base", "10.77.0.1"), ("arm", "10.77.0.2")]) + "[time]\nsource = \"master\"\n"
 }
 
 #[test]
@@ -158,14 +148,12 @@ fn a_laptop_of_a_robot_with_one_computer_calls_hears_and_is_called() {
 
 #[test]
 fn sealed_it_reaches_all_nodes_of_a_lan_and_an_outage_costs_a_gap() {
-    let Some(field) = Field::launched(&["base", "arm", "far"], TWO, SEALED) else { return };
+    let Some(field) = Field::launched(&["base", "arm", "far"], &two(), SEALED) else { return };
     field.check_talk();
     field.check_tools();
     let before = wait("far counts outages", || field.beyond()?["outages"].as_u64());
     let server = field.place.robot_at(&field.config, "base");
-    let old = server.pid("tcp.255");
-    signal(old, Signal::SIGKILL);
-    server.wait_restarted("tcp.255", old);
+    server.kill("tcp.255");
     field.check_talk();
     let (began_ns, ended_ns) = wait("it says how long it was away", || {
         let beyond = field.beyond()?;
@@ -174,9 +162,9 @@ fn sealed_it_reaches_all_nodes_of_a_lan_and_an_outage_costs_a_gap() {
         Some((beyond["outage"]["began_ns"].as_u64()?, beyond["outage"]["ended_ns"].as_u64()?))
     });
     assert!(began_ns < ended_ns, "{began_ns} to {ended_ns}");
-    wait("it says so in words", || {
+    until("it says so in words", || {
         let net = field.shows(&["net"]).out;
-        net.lines().any(|line| line.starts_with("far ") && line.contains("  took ")).then_some(())
+        net.lines().any(|line| line.starts_with("far ") && line.contains("  took "))
     });
     field.stop();
 }

@@ -1,54 +1,43 @@
 //! A place of its own for each test: shared memory, files, processes. Everything is removed when the place is dropped.
 
-use crate::probe::ProbingInterface;
 use crate::process::{Running, Said};
+pub(crate) use crate::robot::Robot;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost::serde::Serialize;
-use rohrpost::wire::append;
-use rohrpost::{Name, ToolLink};
+use rohrpost::Module;
+use rohrpost::serde::Deserialize;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Node, NodeError, ParticipantInfo, local, node_directory};
-use rohrpost_modules::runtime::ClientError;
+use rohrpost_mailbox::{Node, node_directory};
+use rohrpost_modules::runtime::{Start, run_started, tell_exit};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use rohrpost_testbed::report::skipped;
+pub(crate) use rohrpost_testbed::report::{PATIENCE, until, wait};
+use serde_json::Value;
 use std::fmt::Debug;
-use std::io::ErrorKind;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::str::FromStr;
+use std::sync::LazyLock;
+use std::time::Instant;
 use tempfile::TempDir;
 
 /// The command under test.
 const ROHRPOST: &str = env!("CARGO_BIN_EXE_rohrpost");
-/// Limit of all waits, long enough for a busy computer.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Head of all configurations: no real-time scheduling, so that tests run beside each other.
-const HEAD: &str = r#"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-probe = { id = 96 }
-output = { id = 32, text = "Collects what modules say" }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-"#;
+fn head_of(installation: &str, classes: &str) -> String {
+    let classes: String =
+        classes.split(", ").map(|class| format!("{} }}\n", class.replace(' ', " = { id = "))).collect();
+    format!(
+        "installation = \"{installation}\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\n{classes}[scheduling]\n\
+         real-time-from = 256\n"
+    )
+}
 
-/// Waits until there is a value, and fails with the name of what was awaited.
-pub(crate) fn wait<T>(what: impl Debug, mut look: impl FnMut() -> Option<T>) -> T {
-    let start = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(start.elapsed() < PATIENCE, "waited {PATIENCE:?} in vain: {what:?}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+/// Head of a configuration of these classes, `class id, class id`, of the installation `test`.
+pub(crate) fn head(classes: &str) -> String {
+    head_of("test", classes)
 }
 
 /// The `--timeout` of commands on a busy computer, longer than the usual second; unless a test sets its own.
@@ -60,6 +49,31 @@ pub(crate) fn patient<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
         ["param", _, ..] if !is_said => [&arguments[..2], &PATIENT, &arguments[2..]].concat(),
         _ => arguments.to_vec(),
     }
+}
+
+/// Objects that a tool has printed, one a line.
+pub(crate) fn json_lines(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"))).collect()
+}
+
+/// All these words are in a text.
+#[track_caller]
+pub(crate) fn assert_has<const N: usize>(text: &str, words: [&str; N]) {
+    let missing = words.into_iter().find(|words| !text.contains(words));
+    assert_eq!(missing, None, "missing in:\n{text}");
+}
+
+/// Python with these arguments in a place, which writes nothing beside its sources.
+pub(crate) fn python(place: &Place, arguments: &[&str]) -> Command {
+    let mut command = Command::new("python3");
+    command.arg("-B").args(arguments).current_dir(place.path("")).env("ROHRPOST_DIR", place.memory());
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// A file of this repository.
+pub(crate) fn repository(path: &str) -> String {
+    format!("{}/../{path}", env!("CARGO_MANIFEST_DIR"))
 }
 
 /// Whether a test was skipped for lack of network namespaces.
@@ -101,40 +115,47 @@ pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
     )
 }
 
+/// Tables of further classes, `class id, class id`.
+pub(crate) fn classes(classes: &str) -> String {
+    classes.split(", ").map(|class| format!("[classes.{}\n", class.replace(' ', "]\nid = "))).collect()
+}
+
 /// Classes of modules that are recorded and replayed, for configurations that have such.
-pub(crate) const RECORDED_CLASSES: &str = "
-[classes.motor]
-id = 200
-[classes.odometry]
-id = 160
-[classes.laser]
-id = 150
-[classes.pilot]
-id = 140
-[classes.seer]
-id = 110
-[classes.feeder]
-id = 100
-[classes.mapper]
-id = 95
-[classes.logd]
-id = 24
-";
+pub(crate) static RECORDED_CLASSES: LazyLock<String> = LazyLock::new(|| {
+    classes("motor 200, odometry 160, laser 150, pilot 140, seer 110, feeder 100, mapper 95, logd 24")
+});
 
 /// A simulated robot with streams, one of them of pictures; first of a configuration, since classes are before modules.
 pub(crate) fn simulated() -> String {
-    let map = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
+    let map = repository("config/building.map");
     format!(
-        "{RECORDED_CLASSES}[classes.camera]\nid = 112\n[[module]]\nname = \"motor.0\"\nbuiltin = \"sim\"\n\
+        "{}[classes.camera]\nid = 112\n[[module]]\nname = \"motor.0\"\nbuiltin = \"sim\"\n\
          aliases = [\"odometry.0\", \"laser.0\", \"camera.0\"]\nsettings = {{ map = {map:?}, camera-rate-hz = 2 }}\n\
-         [module.stream.image]\nrecord = \"1 MiB\"\nkeep = 4\n"
+         [module.stream.image]\nrecord = \"1 MiB\"\nkeep = 4\n",
+        *RECORDED_CLASSES
     )
 }
 
-/// Sections of a configuration with several nodes.
-pub(crate) const NETWORK: &str = "[network]\nsecurity = \"none\"\n[time]\nsource = \"master\"\n";
-
 pub(crate) const OUTPUT: &str = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\n";
+
+/// How often a test does something: what the environment says, for a long run.
+pub(crate) fn times<T: FromStr<Err: Debug>>(variable: &str, usually: T) -> T {
+    std::env::var(variable).map_or(usually, |times| times.parse().unwrap())
+}
+
+/// What a module's program does that is this test program: launch, or an exact replay, runs it by one test alone. Run as
+/// a test that ends at once.
+pub(crate) fn run_if_launched<M: Module>() {
+    if ["ROHRPOST_MODULE", "ROHRPOST_EXACT"].iter().any(|variable| std::env::var_os(variable).is_some()) {
+        let ended = Start::from_environment().and_then(run_started::<M>);
+        std::process::exit(tell_exit(ended).into());
+    }
+}
+
+/// Settings of a module that has none.
+#[derive(Deserialize)]
+#[serde(crate = "rohrpost::serde", deny_unknown_fields)]
+pub(crate) struct NoSettings {}
 
 /// Whether a process of this number runs. A zombie does not, and holds no resources.
 pub(crate) fn runs(pid: u32) -> bool {
@@ -152,7 +173,7 @@ pub(crate) fn state(stat: &Path) -> char {
 /// Stops a process as Ctrl-Z does, and waits until it is stopped.
 pub(crate) fn halt(pid: u32) {
     signal(pid, Signal::SIGSTOP);
-    wait(format!("{pid} stands"), || (state(Path::new(&format!("/proc/{pid}/stat"))) == 'T').then_some(()));
+    until(format!("{pid} stands"), || state(Path::new(&format!("/proc/{pid}/stat"))) == 'T');
 }
 
 pub(crate) fn signal(pid: u32, signal: Signal) {
@@ -180,8 +201,44 @@ impl Place {
         Self { folder: builder().tempdir().unwrap(), memory }
     }
 
+    /// A place with a node on which these modules are on.
+    pub(crate) fn running(modules: &[&str]) -> (Self, Running, Robot) {
+        let place = Self::new();
+        let (launch, robot) = place.launched(modules);
+        (place, launch, robot)
+    }
+
+    /// The same, without waiting until they are.
+    pub(crate) fn begun(modules: &[&str]) -> (Self, Running, Robot) {
+        let place = Self::new();
+        let config = place.config(modules);
+        let mut launch = place.launch(&config);
+        let robot = place.robot(&config, "main", &mut launch);
+        (place, launch, robot)
+    }
+
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
+    }
+
+    /// Writes a file; where it is.
+    pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let file = self.path(name);
+        std::fs::write(&file, content).unwrap();
+        file
+    }
+
+    /// Writes a program; where it is.
+    pub(crate) fn program(&self, name: &str, code: impl AsRef<[u8]>) -> PathBuf {
+        let file = self.write(name, code);
+        std::fs::set_permissions(&file, PermissionsExt::from_mode(0o755)).unwrap();
+        file
+    }
+
+    /// Copies a file of the repository here, under its own name.
+    pub(crate) fn copy(&self, file: &str) {
+        let name = Path::new(file).file_name().unwrap().to_str().unwrap();
+        std::fs::copy(repository(file), self.path(name)).unwrap();
     }
 
     /// Directory of nodes.
@@ -195,10 +252,9 @@ impl Place {
     }
 
     pub(crate) fn config_of(&self, installation: &str, nodes: &str, modules: &[&str]) -> PathBuf {
-        let file = self.path(&format!("{installation}.toml"));
-        let text = format!("installation = \"{installation}\"\n{HEAD}{nodes}\n{}", modules.concat());
-        std::fs::write(&file, text).unwrap();
-        file
+        let head = head_of(installation, "router 250, probe 96, output 32, tool 16");
+        let text = format!("{head}{nodes}\n{}", modules.concat());
+        self.write(&format!("{installation}.toml"), text)
     }
 
     /// Lines of the probes' record.
@@ -224,6 +280,10 @@ impl Place {
         command
     }
 
+    pub(crate) fn start(&self, arguments: &[&str]) -> Running {
+        Running::start(self.command(arguments))
+    }
+
     /// Runs a command to its end, with retries for `echo`, which has a fixed timeout of a second.
     pub(crate) fn say(&self, arguments: &[&str]) -> Said {
         let began = Instant::now();
@@ -238,7 +298,7 @@ impl Place {
 
     /// Runs it without retries.
     pub(crate) fn say_at_once(&self, arguments: &[&str]) -> Said {
-        Running::start(self.command(arguments)).said()
+        self.start(arguments).said()
     }
 
     /// The same, from a node of this configuration.
@@ -249,16 +309,32 @@ impl Place {
 
     /// Starts `rohrpost launch`.
     pub(crate) fn launch(&self, config: &Path) -> Running {
-        Running::start(self.command(&["launch", config.to_str().unwrap()]))
+        self.start(&["launch", config.to_str().unwrap()])
     }
 
     /// Starts it and waits until all modules are on.
     pub(crate) fn launched(&self, modules: &[&str]) -> (Running, Robot) {
-        let config = self.config(modules);
-        let mut launch = self.launch(&config);
-        let robot = self.robot(&config, "main", &mut launch);
+        self.launched_from(&self.config(modules))
+    }
+
+    /// Starts it with a configuration of one node and waits until all modules are on.
+    pub(crate) fn launched_from(&self, config: &Path) -> (Running, Robot) {
+        self.up(self.command(&["launch", config.to_str().unwrap()]), config, "main")
+    }
+
+    /// Starts a node by this command and waits until all its modules are on.
+    pub(crate) fn up(&self, command: Command, config: &Path, node_name: &str) -> (Running, Robot) {
+        let mut launch = Running::start(command);
+        let robot = self.robot(config, node_name, &mut launch);
         robot.wait_on(&mut launch);
         (launch, robot)
+    }
+
+    /// Stops a launch, which leaves nothing of any node.
+    #[track_caller]
+    pub(crate) fn end(&self, launch: &mut Running) {
+        launch.stop();
+        self.assert_empty();
     }
 
     /// Waits until a node exists.
@@ -299,95 +375,5 @@ impl Drop for Place {
                 let _ = node.process_of(left).ok().flatten().map(|process| process.kill());
             }
         }
-    }
-}
-
-/// A running node, seen by a test that takes part as a tool.
-pub(crate) struct Robot {
-    pub(crate) installation: Installation,
-    pub(crate) node: Arc<Node>,
-    node_name: String,
-}
-
-impl Robot {
-    pub(crate) fn name(&self, module: &str) -> Name {
-        self.installation.classes.parse_name(module).unwrap().module()
-    }
-
-    pub(crate) fn tool(&self, timeout: Duration) -> ToolLink {
-        self.tool_if_there(timeout).unwrap_or_else(|| panic!("the node is gone: {}", self.node.path().display()))
-    }
-
-    /// The same of a node that may end meanwhile: none when it is gone.
-    pub(crate) fn tool_if_there(&self, timeout: Duration) -> Option<ToolLink> {
-        match ToolLink::join(&self.installation, &self.node, &self.node_name, timeout) {
-            Err(ClientError::Node(NodeError::Io(_, error))) if error.kind() == ErrorKind::NotFound => None,
-            joined => Some(joined.unwrap()),
-        }
-    }
-
-    /// Sends a probe a command, once; waiting for its answer would repeat it.
-    pub(crate) fn begin(&self, tool: &mut ToolLink, module: &str, function: u16, arguments: &impl Serialize) -> u32 {
-        let write = |body: &mut Vec<u8>| append(body, arguments);
-        tool.link.begin(self.name(module), function, ProbingInterface::hash(), PATIENCE, write).unwrap()
-    }
-
-    /// The module's process.
-    pub(crate) fn process(&self, module: &str) -> Option<ParticipantInfo> {
-        let name = self.name(module);
-        self.node.participants().into_iter().find(|p| p.module == name && p.pid != 0)
-    }
-
-    pub(crate) fn state(&self, module: &str) -> &'static str {
-        self.process(module).and_then(|p| p.state).map_or("none", rohrpost_mailbox::ModuleState::name)
-    }
-
-    pub(crate) fn pid(&self, module: &str) -> u32 {
-        self.process(module).unwrap_or_else(|| panic!("{module} does not run")).pid
-    }
-
-    /// Processes of all modules.
-    pub(crate) fn pids(&self) -> Vec<u32> {
-        let modules = self.node.participants().into_iter().filter(|p| p.state.is_some());
-        modules.map(|p| p.pid).filter(|pid| *pid != std::process::id()).collect()
-    }
-
-    pub(crate) fn wait_on(&self, launch: &mut Running) {
-        let mut on = 0;
-        for module in self.installation.modules_on(&self.node_name) {
-            let is_on = module.start == rohrpost_config::Start::On;
-            on += u64::from(is_on);
-            let (name, state) = (self.installation.classes.format(module.name), if is_on { "on" } else { "off" });
-            wait(format!("{name} is not {state}"), || {
-                launch.assert_runs();
-                (self.state(&name) == state).then_some(())
-            });
-        }
-        // Launch takes the first place of a tool. Before all modules have answered, a stop would be a failed start.
-        let tools = self.installation.node(&self.node_name).unwrap().tools.clone();
-        let replies = Name::new(self.installation.system.id, 16, *tools.start(), local::REPLIES);
-        wait("launch has heard from all", || {
-            let heard = self.node.look_at(replies)?.classes.iter().map(|class| class.received).sum::<u64>();
-            (heard >= on).then_some(())
-        });
-        // A module that has answered still holds the package for a moment; and a busy one may have been asked twice.
-        for module in self.installation.modules_on(&self.node_name) {
-            let name = self.installation.classes.format(module.name);
-            if name.starts_with("probe.") {
-                wait(format!("{name} is done"), || (self.waiting(&name) == 0).then_some(()));
-            }
-        }
-    }
-
-    /// Packages that wait in a module's command mailbox.
-    pub(crate) fn waiting(&self, module: &str) -> u32 {
-        self.node.look_at(self.name(module)).map_or(0, |mailbox| mailbox.depth)
-    }
-
-    /// Waits until the module runs in another process than this one, and answers.
-    pub(crate) fn wait_restarted(&self, module: &str, old_pid: u32) -> ParticipantInfo {
-        wait(format!("{module} is not on again"), || {
-            self.process(module).filter(|p| p.pid != old_pid && p.state == Some(rohrpost_mailbox::ModuleState::On))
-        })
     }
 }

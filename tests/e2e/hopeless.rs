@@ -1,15 +1,11 @@
 //! Modules that cannot start, however often they are tried: their mistake is told once, and the truth about the others.
 
 use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, probe};
-use crate::process::Running;
 use nix::sys::signal::Signal;
-use std::os::unix::fs::PermissionsExt;
 
 /// A module of a program in Python that never becomes one.
 fn python(place: &Place, code: &str, keys: &str) -> String {
-    let path = place.path("hand.py");
-    std::fs::write(&path, format!("#!/usr/bin/env python3\n{code}\n")).unwrap();
-    std::fs::set_permissions(&path, PermissionsExt::from_mode(0o755)).unwrap();
+    place.program("hand.py", format!("#!/usr/bin/env python3\n{code}\n"));
     format!("[[module]]\nname = \"pilot.0\"\nprogram = \"./hand.py\"\n{keys}\n")
 }
 
@@ -29,12 +25,11 @@ fn a_mistake_that_stays_is_told_once_and_not_tried_again() {
     for (module, words) in cases {
         let place = Place::new();
         let hopeless = module(&place);
-        let config = place.config(&[RECORDED_CLASSES, &hopeless, OUTPUT, &probe("probe.0", "", "")]);
+        let config = place.config(&[&RECORDED_CLASSES, &hopeless, OUTPUT, &probe("probe.0", "", "")]);
         let mut launch = place.launch(&config);
         launch.wait_for("runs: ");
         launch.wait_for(" does not start; the others go on without it");
-        launch.signal(Signal::SIGINT);
-        assert_eq!(launch.end().code(), Some(1), "it has failed for good");
+        launch.stop_failed();
         let told = launch.out();
         assert!(told.contains("not started again, since that would end in the same way"), "{told}");
         let (times, is_tried_again) = (told.matches(words).count(), told.contains("starts again"));
@@ -47,7 +42,7 @@ fn a_mistake_that_stays_is_told_once_and_not_tried_again() {
 fn what_may_get_better_is_told_whole_once_and_then_in_short() {
     let place = Place::new();
     let flaky = python(&place, "raise RuntimeError('the port is not there')", "required = false");
-    let config = place.config(&[RECORDED_CLASSES, &flaky, OUTPUT, &probe("probe.0", "", "")]);
+    let config = place.config(&[&RECORDED_CLASSES, &flaky, OUTPUT, &probe("probe.0", "", "")]);
     let mut launch = place.launch(&config);
     launch.wait_for("starts again in 800ms; as before");
     let told = launch.out();
@@ -60,8 +55,8 @@ fn what_may_get_better_is_told_whole_once_and_then_in_short() {
 #[test]
 fn nobody_is_said_to_go_on_where_there_are_no_others() {
     let place = Place::new();
-    let config = place.config(&[RECORDED_CLASSES, OUTPUT, &python(&place, "def hold(:", "required = false")]);
-    let said = Running::start(place.command(&["launch", config.to_str().unwrap()])).said();
+    let config = place.config(&[&RECORDED_CLASSES, OUTPUT, &python(&place, "def hold(:", "required = false")]);
+    let said = place.start(&["launch", config.to_str().unwrap()]).said();
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.err.contains("module pilot.0 did not become ready") && said.err.contains("SyntaxError"), "{said:?}");
     assert!(!said.err.contains("the others go on") && !said.out.contains("the others go on"), "{said:?}");

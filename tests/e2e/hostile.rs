@@ -4,16 +4,14 @@
 //! Both are programs in Python that know the pages of the book alone (`python/node.py`, `python/teammate.py`). For the
 //! whole minute: `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost-cli --test e2e hostile`.
 
-use crate::harness::{PATIENCE, Place, Robot, lab};
-use crate::process::{Running, Said};
+use crate::harness::{PATIENCE, Place, Robot, lab, repository, times};
+use crate::network::Network;
+use crate::process::Running;
 use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{LaserInterface, WheelsInterface};
 use rohrpost::types::Odometry;
 use rohrpost::wire::{append, from_bytes};
-use rohrpost_routers::lab::Lab;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 const NODES: [(&str, &str); 4] =
@@ -29,58 +27,32 @@ const SECURITY: &str = "security = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertific
 const GROWTH_KIB_MAX: u64 = 16 << 10;
 
 struct Field {
-    // Dropped in this order: processes, what they left, their network.
-    nodes: Vec<(Running, Robot)>,
-    place: Place,
-    lab: Lab,
+    network: Network,
 }
 
 impl Field {
     fn launched() -> Option<Self> {
         let lab = lab(NODES, "hostile programs beside the demo")?;
         let place = Place::new();
-        let mut field = Self { nodes: Vec::new(), place, lab };
-        std::fs::write(field.config(), robot()).unwrap();
-        std::fs::write(field.place.path("building.map"), include_str!("../../config/building.map")).unwrap();
+        let config = place.write("robot.toml", robot());
+        place.copy("config/building.map");
         // The teammate's certificate is signed by the same authority, for a node of another system.
         let teammate = robot().replace("id = 1\n", "id = 2\n").replace("name = \"robot\"", "name = \"mate\"");
         let teammate = teammate.replace("server = \"base\"\n", "").replace("nodes.desk", "nodes.evil");
-        std::fs::write(field.place.path("mate.toml"), teammate.replace("\"desk\"", "\"evil\"")).unwrap();
+        place.write("mate.toml", teammate.replace("\"desk\"", "\"evil\""));
         for file in ["robot.toml", "mate.toml"] {
-            field.place.say(&["keys", "new", field.place.path(file).to_str().unwrap()]).ok();
+            place.say(&["keys", "new", place.path(file).to_str().unwrap()]).ok();
         }
-        for node in RUNNING {
-            let command = field.place.command(&["launch", field.config().to_str().unwrap(), "--node", node]);
-            let mut launch = {
-                let _inside = field.lab.enter(node).unwrap();
-                Running::start(command)
-            };
-            let robot = field.place.robot(&field.config(), node, &mut launch);
-            robot.wait_on(&mut launch);
-            field.nodes.push((launch, robot));
-        }
-        Some(field)
-    }
-
-    fn config(&self) -> PathBuf {
-        self.place.path("robot.toml")
+        Some(Self { network: Network::new(place, config, Some(lab)).launched(&RUNNING) })
     }
 
     fn robot(&self) -> &Robot {
-        &self.nodes[0].1
-    }
-
-    fn says(&self, node: &str, arguments: &[&str]) -> Said {
-        self.place.say_at(&self.config(), node, arguments)
+        self.network.robot("base")
     }
 
     fn python(&self, node: &str, program: &str, arguments: &[&str]) -> Running {
-        let page = format!("{}/../tests/e2e/python/{program}", env!("CARGO_MANIFEST_DIR"));
-        let mut command = Command::new("python3");
-        command.arg("-B").arg(page).args(arguments).current_dir(self.place.path(""));
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let _inside = self.lab.enter(node).unwrap();
-        Running::start(command)
+        let page = repository(&format!("tests/e2e/python/{program}"));
+        self.network.python(node, &[&[&*page], arguments].concat())
     }
 
     /// The hostile node and the hostile teammate, taking part.
@@ -116,16 +88,12 @@ impl Field {
 
     /// Memory of each process of the robot, KiB.
     fn memory(&self) -> BTreeMap<u32, u64> {
-        let pids = self.nodes.iter().flat_map(|(_, robot)| robot.pids());
+        let pids = self.network.nodes.iter().flat_map(|(.., robot)| robot.pids());
         pids.map(|pid| (pid, resident_kib(pid))).collect()
     }
 
-    fn stop(mut self) {
-        for (mut launch, robot) in self.nodes.drain(..).rev() {
-            drop(robot);
-            launch.stop();
-        }
-        self.place.assert_empty();
+    fn stop(self) {
+        self.network.stop();
     }
 }
 
@@ -148,17 +116,14 @@ fn robot() -> String {
     text.replace("[nodes.base]", "tcp = { id = 64, text = \"Carries packages beyond the LAN\" }\n\n[nodes.base]")
 }
 
-fn seconds() -> u64 {
-    std::env::var("ROHRPOST_HOSTILE_SECONDS").ok().map_or(20, |seconds| seconds.parse().unwrap())
-}
-
 #[test]
 fn a_robot_drives_as_before_beside_a_hostile_node_and_a_hostile_teammate() {
     let Some(field) = Field::launched() else { return };
-    let time = Duration::from_secs(seconds());
+    let seconds = times("ROHRPOST_HOSTILE_SECONDS", 20);
+    let time = Duration::from_secs(seconds);
     field.drives(Duration::from_secs(3));
     let (before, alone_m) = (field.memory(), field.drives(time / 2));
-    let mut hostile = field.attacked(seconds());
+    let mut hostile = field.attacked(seconds);
     let beside_m = field.drives(time / 2);
     let tried: Vec<BTreeMap<String, u64>> = hostile
         .iter_mut()
@@ -197,7 +162,8 @@ fn causes(told: &serde_json::Value, sums: &mut BTreeMap<String, u64>) {
 /// Each kind of attempt is counted under its own cause, where it was refused.
 fn check_counted(field: &Field, tried: &[BTreeMap<String, u64>]) {
     let mut sums = BTreeMap::new();
-    let told: serde_json::Value = serde_json::from_str(field.says("base", &["net", "--json"]).out.trim()).unwrap();
+    let told: serde_json::Value =
+        serde_json::from_str(field.network.says("base", &["net", "--json"]).out.trim()).unwrap();
     causes(&told, &mut sums);
     let mut tool = field.robot().tool(PATIENCE);
     for module in ["pilot.0", "laser.0", "mapper.0"] {
@@ -210,7 +176,7 @@ fn check_counted(field: &Field, tried: &[BTreeMap<String, u64>]) {
         counts.into_iter().for_each(|(cause, count)| *sums.entry(format!("{module} {cause}")).or_default() += count);
     }
     tool.close();
-    let lines = field.says("base", &["call", "output.0", "refused", "--json"]).ok();
+    let lines = field.network.says("base", &["call", "output.0", "refused", "--json"]).ok();
     let lines: BTreeMap<String, u64> = serde_json::from_str(&lines).unwrap();
     sums.extend(lines.into_iter().map(|(cause, count)| (format!("output.0 {cause}"), count)));
     for (attempts, cause) in [
@@ -241,7 +207,7 @@ fn check_counted(field: &Field, tried: &[BTreeMap<String, u64>]) {
 /// A hostile module's text has no effect on the terminal.
 fn check_said(field: &Field) {
     for arguments in [&["call", "2.mapper.0.0"][..], &["status", "2.mapper.0.0"], &["list"], &["log", "--last", "50"]] {
-        let said = field.says("base", arguments);
+        let said = field.network.says("base", arguments);
         let is_raw = |c: &char| c.is_control() && *c != '\n' && *c != '\t' || *c == '\u{202e}';
         for text in [&said.out, &said.err] {
             assert_eq!(text.chars().find(is_raw), None, "{arguments:?}: {text:?}");

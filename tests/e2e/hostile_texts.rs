@@ -1,7 +1,7 @@
 //! Foreign texts in each tool: names, texts, units, values, faults and lines of a module that tries to control the
 //! terminal.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, program, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, program, run_if_launched, until};
 use crate::record::recording_that_says;
 use crate::replayed_others::bag_that_says;
 use rohrpost::interface::{Interface, Serve};
@@ -23,10 +23,7 @@ const REFUSES: u16 = 18;
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Hostile>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Hostile>();
 }
 
 /// A type with only hostile names.
@@ -186,7 +183,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
     for (name, state) in [("output.0", "on"), ("probe.0", "on"), ("probe.1", "error")] {
-        wait(format!("{name} is {state}"), || (robot.state(name) == state).then_some(()));
+        until(format!("{name} is {state}"), || robot.state(name) == state);
     }
     robot.tool(PATIENCE).close();
     let saved = place.path("saved.toml");

@@ -2,14 +2,15 @@
 //! alone. The robot is on `base`; its file knows the laptop as a node that the TCP router reaches, and nothing is
 //! launched there.
 
-use crate::harness::{Place, Robot, halt, lab, program, signal, wait};
+use crate::harness::{
+    Place, assert_has, halt, head, json_lines, lab, program, python, repository, signal, until, wait,
+};
+use crate::network::Network;
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
-use rohrpost_routers::lab::Lab;
 use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 
 const NODES: [(&str, &str); 2] = [("base", "10.80.0.1"), ("laptop", "10.80.0.2")];
 const OPEN: &str = "security = \"none\"";
@@ -18,15 +19,7 @@ const SERVER: &str = "10.80.0.1:21119";
 const PAGE: &str = include_str!("../../docs/src/python.md");
 
 struct Scene {
-    // Dropped in this order: processes, what they left, their network.
-    launch: Running,
-    robot: Robot,
-    place: Place,
-    lab: Lab,
-}
-
-fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+    network: Network,
 }
 
 impl Scene {
@@ -39,53 +32,37 @@ impl Scene {
     fn with(security: &str, modules: &str) -> Option<Self> {
         let lab = lab(NODES, "Python on a laptop")?;
         let place = Place::new();
-        let config = place.path("robot.toml");
-        std::fs::write(&config, configured(security) + modules).unwrap();
+        let config = place.write("robot.toml", configured(security) + modules);
         if security == SEALED {
             place.say(&["keys", "new", config.to_str().unwrap()]).ok();
         }
-        let command = place.command(&["launch", config.to_str().unwrap(), "--node", "base"]);
-        let mut launch = {
-            let _inside = lab.enter("base").unwrap();
-            Running::start(command)
-        };
-        let robot = place.robot(&config, "base", &mut launch);
-        robot.wait_on(&mut launch);
-        let scene = Self { launch, robot, place, lab };
-        wait("the robot's modules are at the TCP router", || {
-            let net: serde_json::Value = serde_json::from_str(scene.says(&["net", "--json"]).out.trim()).ok()?;
-            (net[0]["beyond"]["state"] == "up").then_some(())
-        });
-        Some(scene)
+        let network = Network::new(place, config, Some(lab)).launched(&["base"]);
+        until("the robot's modules are at the TCP router", || network.net("base")["beyond"]["state"] == "up");
+        Some(Self { network })
     }
 
     /// Python on the laptop.
     fn python(&self, arguments: &[&str]) -> Running {
-        let mut command = Command::new("python3");
-        // Beside the sources nothing is to be written.
-        command.arg("-B").args(arguments).current_dir(self.place.path(""));
-        command.env("PYTHONPATH", repository().join("clients/python/src"));
-        command.env("ROHRPOST_DIR", self.place.memory()).env("ROHRPOST_CONFORMING", self.place.path("robot.toml"));
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let _inside = self.lab.enter("laptop").unwrap();
-        Running::start(command)
+        let mut command = python(&self.network.place, arguments);
+        command.env("PYTHONPATH", repository("clients/python/src")).env("ROHRPOST_CONFORMING", &self.network.config);
+        self.network.inside("laptop", || Running::start(command))
     }
 
     /// A program of the book, with the arguments that the book gives it.
     fn book(&self, name: &str) -> Running {
         let fence = format!("```python {name}\n");
         let code = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no {name}")).split("```").next().unwrap();
-        std::fs::write(self.place.path(name), code).unwrap();
+        self.network.place.write(name, code);
         self.python(&[name, SERVER, &self.digests(), "certificates"])
     }
 
     fn digests(&self) -> String {
-        self.robot.installation.digest().to_string()
+        self.network.robot("base").installation.digest().to_string()
     }
 
     /// A person's command on the robot.
     fn says(&self, arguments: &[&str]) -> Said {
-        self.place.say_at(&self.place.path("robot.toml"), "base", arguments)
+        self.network.says("base", arguments)
     }
 
     /// `python -m rohrpost` on the laptop, unsealed.
@@ -105,27 +82,26 @@ impl Scene {
 
     /// The newest picture of the camera, which takes no more of them: its number, and postcard.
     fn newest_picture(&self) -> (String, Vec<u8>) {
-        let (config, raw) = (self.place.path("robot.toml"), self.place.path("newest.postcard"));
-        let at = ["--config", config.to_str().unwrap(), "--node", "base", "--raw", raw.to_str().unwrap()];
-        let said = self.place.say(&[&["stream", "read", "camera.0", "image"][..], &at].concat()).ok();
+        let raw = self.network.place.path("newest.postcard");
+        let said = self.on_node(&["stream", "read", "camera.0", "image", "--raw", raw.to_str().unwrap()]).ok();
         (said.split_whitespace().next().unwrap().into(), std::fs::read(raw).unwrap())
     }
 
-    fn stop(mut self) {
-        drop(self.robot);
-        self.launch.stop();
-        self.place.assert_empty();
+    /// A person's command on the robot that has subcommands.
+    fn on_node(&self, arguments: &[&str]) -> Said {
+        let at = ["--config", self.network.config.to_str().unwrap(), "--node", "base"];
+        self.network.place.say(&[arguments, &at].concat())
+    }
+
+    fn stop(self) {
+        self.network.stop();
     }
 }
 
 fn configured(security: &str) -> String {
-    let map = repository().join("config/building.map");
+    let map = repository("config/building.map");
     format!(
-        "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nmotor = {{ id = 200 }}\n\
-         odometry = {{ id = 160 }}\nlaser = {{ id = 150 }}\ncamera = {{ id = 112 }}\ngripper = {{ id = 110 }}\n\
-         probe = {{ id = 96 }}\n\
-         tcp = {{ id = 64 }}\noutput = {{ id = 32 }}\ntool = {{ id = 16 }}\n[scheduling]\nreal-time-from = 256\n\
-         [nodes.base]\ntools = [0, 15]\n[nodes.laptop]\nnetwork = \"tcp\"\ntools = [64, 127]\n\
+        "{}[nodes.base]\ntools = [0, 15]\n[nodes.laptop]\nnetwork = \"tcp\"\ntools = [64, 127]\n\
          [tcp]\n{security}\naddress = \"{}\"\nserver = \"base\"\n\
          [[module]]\nname = \"motor.0\"\nnode = \"base\"\naliases = [\"odometry.0\", \"laser.0\", \"camera.0\"]\n\
          builtin = \"sim\"\n\
@@ -134,6 +110,7 @@ fn configured(security: &str) -> String {
          [[replica]]\nstream = \"camera.0/image\"\nto = [\"laptop\"]\n\
          [[module]]\nname = \"gripper.0\"\nnode = \"laptop\"\nprogram = \"gripper.py\"\n\
          calls = [\"motor.0\", \"odometry.0\"]\n",
+        head("motor 200, odometry 160, laser 150, camera 112, gripper 110, probe 96, tcp 64, output 32, tool 16"),
         NODES[0].1
     )
 }
@@ -163,7 +140,7 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
     };
     wait_closed("the robot stops, and it closes");
     // What it calls does not answer in time: that is no error of its own, and passes.
-    let motor = scene.robot.pid("motor.0");
+    let motor = scene.network.robot("base").pid("motor.0");
     halt(motor);
     let late = closes();
     assert!(
@@ -178,33 +155,26 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
         (Some(1), "gripper.0 answers with an error: \"more than 20 N break it\"")
     );
     let said = scene.says(&["call", "gripper.0"]).ok();
-    for words in ["Holds things, and stops the robot while it takes them.", "close <force_n: f64>", "How it holds now."]
-    {
-        assert!(said.contains(words), "{words}: {said}");
-    }
+    assert_has(
+        &said,
+        ["Holds things, and stops the robot while it takes them.", "close <force_n: f64>", "How it holds now."],
+    );
     let held = scene.says(&["echo", "gripper.0", "grip", "--count", "1"]).ok();
     assert!(held.ends_with("{width_m: 0.02, force_n: 4}\n"), "{held}");
-    let config = scene.place.path("robot.toml");
-    let set = |value: &str| {
-        let at = ["--config", config.to_str().unwrap(), "--node", "base"];
-        scene.place.say(&[&["param", "set", "gripper.0", "speed-m-s", value][..], &at].concat())
-    };
+    let set = |value: &str| scene.on_node(&["param", "set", "gripper.0", "speed-m-s", value]);
     assert_eq!(set("0.1").ok(), "gripper.0 speed-m-s: 0.05 -> 0.1 m/s\n");
     assert!(set("0.3").fails().contains("out of range: 0..=0.2"));
-    let export = ["interface", "export", "gripper.0", "--json", "--config", config.to_str().unwrap(), "--node", "base"];
-    let file = scene.place.path("gripper.json");
-    std::fs::write(&file, scene.place.say(&export).ok()).unwrap();
-    let code = scene.place.say(&["interface", "generate", "--lang", "rust", file.to_str().unwrap()]).ok();
+    let file =
+        scene.network.place.write("gripper.json", scene.on_node(&["interface", "export", "gripper.0", "--json"]).ok());
+    let code = scene.network.place.say(&["interface", "generate", "--lang", "rust", file.to_str().unwrap()]).ok();
     assert!(code.contains("fn close(&mut self, force_n: f64) -> Result<Grip, String>;"), "{code}");
     // The TCP router is killed; the program in Python comes back by itself, the same one.
-    signal(scene.robot.pid("tcp.255"), Signal::SIGKILL);
+    signal(scene.network.robot("base").pid("tcp.255"), Signal::SIGKILL);
     wait_closed("it is called again");
     gripper.assert_runs();
     gripper.signal(Signal::SIGINT);
     gripper.end();
-    wait("it has gone", || {
-        (scene.says(&["call", "--timeout", "1", "gripper.0", "close", "4"]).code != Some(0)).then_some(())
-    });
+    until("it has gone", || scene.says(&["call", "--timeout", "1", "gripper.0", "close", "4"]).code != Some(0));
     scene.stop();
 }
 
@@ -212,9 +182,8 @@ fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
 fn a_picture_comes_as_the_camera_took_it(scene: &Scene, program: impl FnOnce() -> Running, file: &str) {
     scene.says(&["call", "motor.0", "off"]).ok();
     let (number, taken) = scene.newest_picture();
-    let said = program().said().ok();
-    assert!(said.contains(&number) && said.contains("640"), "{number}: {said}");
-    let (size, pixels) = read_png(&scene.place.path(file));
+    program().said().ok_with([&number, "640"]);
+    let (size, pixels) = read_png(&scene.network.place.path(file));
     assert_eq!((size, pixels.len()), ((640, 480), 640 * 480 * 3));
     // Before the pixels stand sizes and format alone.
     assert!(taken.ends_with(&pixels) && taken.len() < pixels.len() + 16, "not as the camera took it");
@@ -233,10 +202,10 @@ fn read_png(file: &Path) -> ((u32, u32), Vec<u8>) {
 #[test]
 fn what_the_tools_print_python_prints_on_the_laptop() {
     let Some(scene) = Scene::launched(OPEN) else { return };
-    wait("all are in the list, which the TCP router makes anew now and then", || {
+    until("all are in the list, which the TCP router makes anew now and then", || {
         let hosts = scene.prints(&["list"]).ok();
         let has = |module| hosts.lines().any(|line| line.starts_with(module) && line.ends_with("node base of robot"));
-        ["motor.0", "odometry.0", "tcp.255"].into_iter().all(has).then_some(())
+        ["motor.0", "odometry.0", "tcp.255"].into_iter().all(has)
     });
     assert!(scene.prints(&["status", "motor.0"]).ok().starts_with("motor.0 is on\n"));
     assert_eq!(scene.prints(&["call", "motor.0.drive", "0.3", "-0.1"]).ok(), "ok\n");
@@ -253,15 +222,14 @@ fn what_the_tools_print_python_prints_on_the_laptop() {
     let got = scene.prints(&["call", "odometry.0.get.odometry"]).ok();
     assert!(got.starts_with("{pose: {x_m: "), "{got}");
     let data = scene.prints(&["echo", "odometry.0.odometry", "--count", "2", "--json"]).ok();
-    let data: Vec<serde_json::Value> = data.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let data = json_lines(&data);
     let numbers = data.iter().map(|data| data["sequence"].as_u64());
     assert_eq!(numbers.collect::<Vec<_>>(), [Some(0), Some(1)], "{data:?}");
-    let time = scene.prints(&["time"]).ok();
-    assert!(time.contains(" s since 1970, off by at most "), "{time}");
+    scene.prints(&["time"]).ok_with([" s since 1970, off by at most "]);
     let picture = || scene.printing(&["picture", "camera.0", "it.png"]);
     a_picture_comes_as_the_camera_took_it(&scene, picture, "it.png");
     let records = scene.prints(&["stream", "read", "camera.0", "image", "--next", "2", "--json", "--bytes", "3"]).ok();
-    let records: Vec<serde_json::Value> = records.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let records = json_lines(&records);
     let values: Vec<_> = records.iter().map(|record| &record["value"]).filter(|value| !value.is_null()).collect();
     assert_eq!(values.len(), 2, "{records:?}");
     let pixels = &values[0]["pixels"];
@@ -274,13 +242,11 @@ fn what_the_tools_print_python_prints_on_the_laptop() {
 #[test]
 fn a_client_in_python_conforms_at_a_tcp_router() {
     let Some(scene) = Scene::launched(OPEN) else { return };
-    let suite = repository().join("tests/conformance");
-    let (run, client) = (suite.join("run.py"), suite.join("client.py"));
-    let (run, client) = (run.to_str().unwrap(), client.to_str().unwrap());
+    let [run, client] = ["run", "client"].map(|name| repository(&format!("tests/conformance/{name}.py")));
     let digests = scene.digests();
-    let live = ["--live", SERVER, &digests, "--", "python3", "-B", client];
-    let in_loop = [&[run, "--only-live"], &live[..], &["--asyncio"]].concat();
-    for suite in [[&[run], &live[..]].concat(), in_loop] {
+    let live = ["--live", SERVER, &digests, "--", "python3", "-B", &client];
+    let in_loop = [&[&*run, "--only-live"], &live[..], &["--asyncio"]].concat();
+    for suite in [[&[&*run], &live[..]].concat(), in_loop] {
         let said = scene.python(&suite).said().ok();
         assert!(said.starts_with("conforms: "), "{said}");
     }
@@ -292,10 +258,10 @@ fn rust_conforms_at_a_tcp_router_too() {
     let module =
         format!("[[module]]\nname = \"probe.0\"\nnode = \"base\"\nprogram = {}\n", program("conforming::module"));
     let Some(scene) = Scene::with(OPEN, &module) else { return };
-    let (run, me) = (repository().join("tests/conformance/run.py"), std::env::current_exe().unwrap());
+    let (run, me) = (repository("tests/conformance/run.py"), std::env::current_exe().unwrap());
     let client = [me.to_str().unwrap(), "--exact", "conforming::client", "--nocapture"];
     let digests = scene.digests();
-    let suite = [run.to_str().unwrap(), "--only-live", "--live", SERVER, &digests, "--"];
+    let suite = [&*run, "--only-live", "--live", SERVER, &digests, "--"];
     let said = scene.python(&[&suite[..], &client].concat()).said().ok();
     assert!(said.starts_with("conforms: "), "{said}");
     scene.stop();

@@ -2,14 +2,13 @@
 //! Python read in place. Those that are not killed go on, pictures are whole, and accounts balance as in Rust.
 
 use crate::c_modules::{CLASSES, compiled, entry, example, said, seen};
-use crate::harness::{OUTPUT, Place, Robot, program, signal, wait};
-use crate::python_node::{package, repository};
+use crate::harness::{OUTPUT, Place, Robot, classes, program, repository, signal, times, until};
+use crate::python_node::package;
 use nix::sys::signal::Signal;
 use rohrpost::Name;
 use rohrpost::interfaces::CameraInterface;
 use rohrpost_mailbox::{ClassTraffic, Loss, Next, Participant, StreamId, StreamReader};
 use std::collections::BTreeMap;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -24,18 +23,9 @@ const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
 const RESTART: &str = "restart = { backoff = \"50 ms\", at-most = 1000, within = \"50 ms\" }";
 
-/// How often one of them is killed: for a long run,
-/// `ROHRPOST_KILLS=200 cargo test -p rohrpost-cli --test e2e languages_killed`.
-fn kills() -> usize {
-    std::env::var("ROHRPOST_KILLS").ok().map_or(8, |kills| kills.parse().unwrap())
-}
-
 /// The module in Python, which finds the package where it was built.
 fn seer(place: &Place) -> PathBuf {
-    let path = place.path("seer.py");
-    std::fs::write(&path, SEER.replace("PACKAGE", package(place).to_str().unwrap())).unwrap();
-    std::fs::set_permissions(&path, PermissionsExt::from_mode(0o755)).unwrap();
-    path
+    place.program("seer.py", SEER.replace("PACKAGE", package(place).to_str().unwrap()))
 }
 
 fn modules(place: &Place) -> Vec<String> {
@@ -44,11 +34,11 @@ fn modules(place: &Place) -> Vec<String> {
     let stream = "[module.stream.image]\nrecord = \"256 KiB\"\nkeep = 4\n";
     let reads = format!("calls = [\"camera.0\"]\n{RESTART}");
     vec![
-        CLASSES.into(),
-        "[classes.seer]\nid = 107\n".into(),
+        CLASSES.clone(),
+        classes("seer 107"),
         OUTPUT.into(),
         entry("camera.0", &quoted(&example(place, "camera")), &format!("{RESTART}\n{stream}")),
-        entry("viewer.0", &quoted(&compiled(place, &repository().join(WATCHER))), &reads),
+        entry("viewer.0", &quoted(&compiled(place, &Path::new(&repository(WATCHER)))), &reads),
         entry("looker.0", &looker, &reads),
         entry("seer.0", &quoted(&seer(place)), &reads),
     ]
@@ -96,9 +86,9 @@ fn check_mailboxes(robot: &Robot, deaths: u64) {
 /// Each reader sees pictures that it had not seen.
 fn go_on(place: &Place, own: &mut Own, before: [u64; 3]) {
     for (module, before) in READERS.into_iter().zip(before) {
-        wait(format!("{module} sees on"), || {
+        until(format!("{module} sees on"), || {
             read_rest(own);
-            (seen(place, module) > before).then_some(())
+            seen(place, module) > before
         });
     }
 }
@@ -132,7 +122,9 @@ fn modules_in_c_rust_and_python_are_killed_and_the_others_go_on() {
     let began = own.reader.position();
     go_on(&place, &mut own, [0; 3]);
     // One after the other, in another order each time round, and at other moments of their periods.
-    let victims: Vec<&str> = (0..kills()).map(|kill| ALL[(kill * 3 + kill / ALL.len()) % ALL.len()]).collect();
+    // For a long run: `ROHRPOST_KILLS=200 cargo test -p rohrpost-cli --test e2e languages_killed`.
+    let kills = times("ROHRPOST_KILLS", 8);
+    let victims: Vec<&str> = (0..kills).map(|kill| ALL[(kill * 3 + kill / ALL.len()) % ALL.len()]).collect();
     // What the killed ones had counted.
     let (mut counted, mut restarts) = ([0; 3], 0);
     for (at, victim) in victims.iter().enumerate() {
@@ -153,6 +145,5 @@ fn modules_in_c_rust_and_python_are_killed_and_the_others_go_on() {
     assert_eq!((told.adoptions as usize, told.refused), (restarts, 0));
     check_mailboxes(&robot, victims.len() as u64);
     drop((own, participant, robot));
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

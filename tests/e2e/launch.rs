@@ -1,6 +1,6 @@
 //! Launch: starts in order, watches, stops in reverse, leaves nothing.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, runs, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, assert_has, halt, probe, runs, until};
 use crate::probe::WORK;
 use crate::process::Running;
 use nix::sys::signal::Signal;
@@ -8,9 +8,8 @@ use nix::sys::signal::Signal;
 #[test]
 fn modules_start_in_order_stop_in_reverse_and_leave_nothing() {
     for number in [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP] {
-        let place = Place::new();
-        let (mut launch, robot) =
-            place.launched(&[OUTPUT, &probe("probe.2", "", ""), &probe("probe.0", "", ""), &probe("probe.1", "", "")]);
+        let (place, mut launch, robot) =
+            Place::running(&[OUTPUT, &probe("probe.2", "", ""), &probe("probe.0", "", ""), &probe("probe.1", "", "")]);
         let pids = robot.pids();
         assert_eq!(pids.len(), 4);
         launch.signal(number);
@@ -27,8 +26,7 @@ fn modules_start_in_order_stop_in_reverse_and_leave_nothing() {
 
 #[test]
 fn what_a_configuration_resolved_to_lies_beside_the_mailboxes() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "optional = true")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "optional = true")]);
     let read = std::fs::read_to_string(robot.node.path().join("node.json")).unwrap();
     let resolved: serde_json::Value = serde_json::from_str(&read).unwrap();
     assert_eq!((&resolved["format"], &resolved["node"]), (&1.into(), &"main".into()));
@@ -46,14 +44,13 @@ fn what_a_configuration_resolved_to_lies_beside_the_mailboxes() {
     assert!(robot.node.path().join(mailbox).exists());
     let checked = place.say(&["check", "test.toml", "--json"]).json();
     assert_eq!(checked["installation"], resolved["installation"], "`check` says the same");
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn a_module_that_is_to_wait_stays_off_until_it_is_switched_on() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "start = \"off\""), &probe("probe.1", "", "")]);
+    let (place, mut launch, robot) =
+        Place::running(&[&probe("probe.0", "", "start = \"off\""), &probe("probe.1", "", "")]);
     // The second is on, so the first was passed over.
     assert_eq!(robot.state("probe.0"), "off");
     assert!(place.say(&["call", "probe.0", "count", "1"]).fails().contains("switch it on"));
@@ -67,9 +64,8 @@ fn a_module_that_is_to_wait_stays_off_until_it_is_switched_on() {
 
 #[test]
 fn a_module_that_will_not_stop_is_killed_and_named() {
-    let place = Place::new();
     let stop_within = "stop-within = \"300 ms\"";
-    let (mut launch, robot) = place.launched(&[
+    let (place, mut launch, robot) = Place::running(&[
         &probe("probe.0", "", ""),
         &probe("probe.1", "ignore-stop = true", stop_within),
         &probe("probe.2", "", stop_within),
@@ -79,12 +75,11 @@ fn a_module_that_will_not_stop_is_killed_and_named() {
     halt(robot.pid("probe.2"));
     let mut tool = robot.tool(PATIENCE);
     robot.begin(&mut tool, "probe.3", WORK, &(60_000u64,));
-    wait("probe.3 works", || (place.recorded("work begins") == 1).then_some(()));
+    until("probe.3 works", || place.recorded("work begins") == 1);
     tool.close();
     launch.signal(Signal::SIGTERM);
     // A launcher may forward a signal at once: a second one within moments means the same.
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success());
+    launch.stop();
     for (module, killed) in [("probe.0", false), ("probe.1", true), ("probe.2", true)] {
         let told = format!("{module} did not stop within 300ms; killed");
         assert_eq!(launch.out().contains(&told), killed, "{module}: {}", launch.out());
@@ -95,11 +90,10 @@ fn a_module_that_will_not_stop_is_killed_and_named() {
 
 #[test]
 fn a_second_launch_is_refused_and_the_first_unharmed() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let (pid, config) = (robot.pid("probe.0"), place.path("test.toml"));
-    let refused = place.say(&["launch", config.to_str().unwrap()]).fails();
-    assert!(refused.contains(&format!("launched already, by process {}", launch.pid())), "{refused}");
+    let said = place.say(&["launch", config.to_str().unwrap()]);
+    said.fails_with([&format!("launched already, by process {}", launch.pid())]);
     assert_eq!(robot.pid("probe.0"), pid);
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
     launch.stop();
@@ -112,9 +106,9 @@ fn of_many_launches_at_once_one_wins() {
     let place = Place::new();
     let config = place.config(&[&probe("probe.0", "", "")]);
     let mut launches: Vec<Running> = (0..6).map(|_| place.launch(&config)).collect();
-    wait("all but one have ended", || {
+    until("all but one have ended", || {
         let ended = launches.iter_mut().filter_map(Running::ended).count();
-        (ended == 5).then_some(())
+        ended == 5
     });
     let winner = launches.iter_mut().position(|launch| launch.ended().is_none()).unwrap();
     let mut winner = launches.swap_remove(winner);
@@ -125,7 +119,6 @@ fn of_many_launches_at_once_one_wins() {
         assert!(launch.err().contains(&format!("launched already, by process {}", winner.pid())), "{}", launch.err());
     }
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
-    drop(robot);
     winner.stop();
     assert_eq!(place.recorded("start"), 1);
     place.assert_empty();
@@ -133,9 +126,8 @@ fn of_many_launches_at_once_one_wins() {
 
 #[test]
 fn what_runs_is_listed_with_state_priority_and_process() {
-    let place = Place::new();
-    let (_launch, robot) =
-        place.launched(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.7", "", "start = \"off\"")]);
+    let (place, _launch, robot) =
+        Place::running(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.7", "", "start = \"off\"")]);
     let list = place.say(&["list", "--json"]).json();
     assert_eq!((list["installation"].as_str(), list["node"].as_str()), (Some("test"), Some("main")));
     let modules = list["modules"].as_array().unwrap();
@@ -152,20 +144,16 @@ fn what_runs_is_listed_with_state_priority_and_process() {
     assert_eq!(modules.len(), 3);
     let text = place.say(&["list", "--mailboxes"]).ok();
     assert!(text.starts_with("node main of test\n"), "{text}");
-    for words in ["probe.7", "1.probe.0.0", "commands", "32 x 1024 B", "displace"] {
-        assert!(text.contains(words), "no `{words}` in:\n{text}");
-    }
+    assert_has(&text, ["probe.7", "1.probe.0.0", "commands", "32 x 1024 B", "displace"]);
 }
 
 #[test]
 fn a_tool_that_still_runs_is_named_when_launch_ends() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let tool = robot.tool(PATIENCE);
     let out = launch.stop();
     assert!(out.contains("somebody still uses") && out.contains("rohrpost clean"), "{out}");
     tool.close();
-    drop(robot);
     assert!(place.say(&["clean"]).ok().contains("removed "));
     place.assert_empty();
 }

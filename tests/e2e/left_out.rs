@@ -1,11 +1,10 @@
 //! Optional modules that lack their programs when launch begins: left out, and started when the programs are there.
 
-use crate::harness::{OUTPUT, Place, probe, signal, wait};
+use crate::harness::{OUTPUT, Place, Robot, probe, signal, until};
 use crate::process::Running;
 use crate::terminal::Terminal;
 use nix::sys::signal::Signal;
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// A probe with a program of this name in place of this test's path.
@@ -24,16 +23,17 @@ fn on_path(place: &Place) -> PathBuf {
     place.path("installed")
 }
 
-fn launch(place: &Place, modules: &[&str]) -> (Running, crate::harness::Robot) {
-    fs::create_dir(on_path(place)).unwrap();
+fn launch(modules: &[&str]) -> (Place, Running, Robot) {
+    let place = Place::new();
+    fs::create_dir(on_path(&place)).unwrap();
     let config = place.config(modules);
     let mut command = place.command(&["launch", config.to_str().unwrap()]);
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let folders = std::iter::once(on_path(place)).chain(std::env::split_paths(&path));
+    let folders = std::iter::once(on_path(&place)).chain(std::env::split_paths(&path));
     command.env("PATH", std::env::join_paths(folders).unwrap());
     let mut launch = Running::start(command);
     let robot = place.robot(&config, "main", &mut launch);
-    (launch, robot)
+    (place, launch, robot)
 }
 
 fn assert_left_out(place: &Place, module: &str) {
@@ -51,95 +51,76 @@ fn a_module_that_was_left_out_starts_when_its_program_is_there() {
         ("./late", "late", "`./late` is no program at "),
         ("rohrpost-late", "installed/rohrpost-late", "`rohrpost-late` is neither in "),
     ] {
-        let place = Place::new();
-        let (mut launch, robot) = launch(&place, &[OUTPUT, &late("probe.1", program), &probe("probe.0", "", "")]);
-        wait("probe.0 is on", || (robot.state("probe.0") == "on").then_some(()));
+        let (place, mut launch, robot) = launch(&[OUTPUT, &late("probe.1", program), &probe("probe.0", "", "")]);
+        until("probe.0 is on", || robot.state("probe.0") == "on");
         launch.wait_for("the module is left out, since it is optional");
         launch.wait_for("runs: 2 modules");
         assert_left_out(&place, "probe.1");
         for order in ["start", "restart"] {
-            let told = place.say(&[order, "probe.1"]).fails();
-            assert!(told.contains(&format!("probe.1 is not started: for launch {place_told}")), "{order}: {told}");
+            place.say(&[order, "probe.1"]).fails_with([&format!("probe.1 is not started: for launch {place_told}")]);
         }
-        let told = place.say(&["stop", "probe.1"]).fails();
-        assert!(told.contains("probe.1 is left out and never ran, since its program is missing"), "{told}");
+        place.say(&["stop", "probe.1"]).fails_with(["probe.1 is left out and never ran, since its program is missing"]);
         assert!(place.say(&["call", "probe.1", "count", "1"]).fails().contains("`rohrpost start probe.1` starts it"));
         // A file that nobody may execute is no program.
-        fs::write(place.path(file), "").unwrap();
+        place.write(file, "");
         place.say(&["start", "probe.1"]).fails();
         assert_left_out(&place, "probe.1");
         fs::remove_file(place.path(file)).unwrap();
 
         build(&place.path(file));
-        let said = place.say(&["start", "probe.1"]).ok();
-        assert!(said.contains("probe.1 runs and is on"), "{said}");
+        place.say(&["start", "probe.1"]).ok_with(["probe.1 runs and is on"]);
         launch.wait_for("probe.1 was left out and is started, as asked: its program is there now");
         assert_eq!(place.say(&["call", "probe.1", "count", "1"]).ok(), "1\n");
         assert!(place.say(&["start", "probe.1"]).fails().contains("probe.1 runs already"));
         // From now on it is a module like others.
-        let pid = robot.pid("probe.1");
-        signal(pid, Signal::SIGKILL);
-        assert_eq!(robot.wait_restarted("probe.1", pid).restarts, 1);
+        assert_eq!(robot.kill("probe.1").restarts, 1);
         place.say(&["stop", "probe.1"]).ok();
         assert!(place.say(&["stop", "probe.1"]).fails().contains("probe.1 is stopped already"));
         place.say(&["restart", "probe.1"]).ok();
-        drop(robot);
-        launch.stop();
-        place.assert_empty();
+        place.end(&mut launch);
     }
 }
 
 #[test]
 fn a_node_of_which_all_is_left_out_waits_for_its_programs() {
-    let place = Place::new();
-    let (mut launch, robot) = launch(&place, &[&late("probe.1", "./late"), &late("probe.0", "./later")]);
+    let (place, mut launch, _robot) = launch(&[&late("probe.1", "./late"), &late("probe.0", "./later")]);
     launch.wait_for("runs: 0 modules");
     assert_left_out(&place, "probe.1");
     build(&place.path("late"));
-    let said = place.say(&["restart", "probe.1"]).ok();
-    assert!(said.contains("probe.1 runs and is on"), "{said}");
+    place.say(&["restart", "probe.1"]).ok_with(["probe.1 runs and is on"]);
     assert_left_out(&place, "probe.0");
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn a_program_that_disappears_while_its_module_runs_is_no_reason_to_leave_it_out() {
-    let place = Place::new();
     let module = late("probe.1", "./late").replace("optional", "restart = \"never\"\noptional");
-    let (mut launch, robot) = launch(&place, &[&module, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = launch(&[&module, &probe("probe.0", "", "")]);
     launch.wait_for("runs: 1 module");
     build(&place.path("late"));
     place.say(&["start", "probe.1"]).ok();
     fs::remove_file(place.path("late")).unwrap();
     signal(robot.pid("probe.1"), Signal::SIGKILL);
     launch.wait_for("probe.1 was killed by signal 9");
-    let told = place.say(&["start", "probe.1"]).fails();
-    assert!(told.contains("probe.1 is not started: for launch `./late` is no program at "), "{told}");
-    drop(robot);
-    launch.signal(Signal::SIGINT);
-    assert_eq!(launch.end().code(), Some(1), "it has failed");
+    place.say(&["start", "probe.1"]).fails_with(["probe.1 is not started: for launch `./late` is no program at "]);
+    launch.stop_failed();
     assert!(launch.err().contains("probe.1 failed for good: was killed by signal 9"), "{}", launch.err());
 }
 
 #[test]
 fn start_and_restart_say_at_once_why_a_program_does_not_run() {
-    let place = Place::new();
     let policy = "restart = { policy = \"on-failure\", backoff = \"10 min\", within = \"1 h\" }\noptional";
     let module = late("probe.1", "./late").replace("optional", policy);
-    let (mut launch, robot) = launch(&place, &[&module, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = launch(&[&module, &probe("probe.0", "", "")]);
     launch.wait_for("runs: 1 module");
     build(&place.path("late"));
     place.say(&["start", "probe.1"]).ok();
     let pid = robot.pid("probe.1");
     fs::remove_file(place.path("late")).unwrap();
-    let told = place.say(&["restart", "probe.1"]).fails();
-    assert!(told.contains("probe.1 is not started: for launch `./late` is no program at "), "{told}");
+    place.say(&["restart", "probe.1"]).fails_with(["probe.1 is not started: for launch `./late` is no program at "]);
     assert_eq!(robot.pid("probe.1"), pid, "it goes on");
     // The kernel looks for the interpreter, and nobody before.
-    fs::write(place.path("late"), "#!/nowhere/python\n").unwrap();
-    fs::set_permissions(place.path("late"), fs::Permissions::from_mode(0o755)).unwrap();
+    place.program("late", "#!/nowhere/python\n");
     for order in ["restart", "start"] {
         let told = place.say(&[order, "probe.1"]).fails();
         assert!(told.contains("probe.1 is not started: it could not be started: "), "{order}: {told}");
@@ -148,7 +129,6 @@ fn start_and_restart_say_at_once_why_a_program_does_not_run() {
     fs::remove_file(place.path("late")).unwrap();
     build(&place.path("late"));
     assert!(place.say(&["start", "probe.1"]).ok().contains("probe.1 runs and is on"));
-    drop(robot);
     launch.stop();
 }
 
@@ -160,19 +140,18 @@ fn a_demo_shows_how_far_its_gui_is_until_that_joins() {
     let demo = fs::read_to_string(folder.join("demo.toml")).unwrap();
     let demo = demo.replace("program = \"rohrpost-gui-bridge\"", "program = \"../late\"");
     fs::create_dir(place.path("config")).unwrap();
-    fs::write(place.path("config/demo.toml"), demo).unwrap();
+    place.write("config/demo.toml", demo);
     fs::copy(folder.join("building.map"), place.path("config/building.map")).unwrap();
-    fs::write(place.path("build.log"), "nice cargo build\n12 of 433 crates\n").unwrap();
+    place.write("build.log", "nice cargo build\n12 of 433 crates\n");
     let said = place.say(&["demo", "--quiet", "--seconds", "0.1", "--gui-build", "build.log"]).ok();
     assert!(said.contains("\nGUI bridge: 12 of 433 crates (build.log)\n"), "why there is no drawing: {said}");
 
     let (terminal, mut demo) = Terminal::start(&place, &["demo", "--gui-build", "build.log"], 30, 120);
     terminal.wait_screen("how far it is", |screen| screen.contains("GUI bridge: 12 of 433 crates (build.log)"));
-    fs::write(place.path("build.log"), "13 of 433 crates\n14 of").unwrap();
+    place.write("build.log", "13 of 433 crates\n14 of");
     terminal.wait_screen("that it goes on", |screen| screen.contains("GUI bridge: 13 of 433 crates (build.log)"));
     // No module, but a program; it is never ready.
-    fs::write(place.path("late"), "#!/bin/sh\nexec sleep 1000\n").unwrap();
-    fs::set_permissions(place.path("late"), fs::Permissions::from_mode(0o755)).unwrap();
+    place.program("late", "#!/bin/sh\nexec sleep 1000\n");
     place.say(&["start", "gui.0", "--no-wait"]).ok();
     terminal.wait_screen("that it has joined", |screen| {
         !screen.contains("GUI bridge") && screen.contains("gui.0 was left out and is started")

@@ -1,6 +1,6 @@
 //! The collector rejects lines in another's name, of future times, or without end.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, until, wait};
 use rohrpost::common::{DataHead, OutputLevel};
 use rohrpost::interfaces::{CollectorInterface, RefusedLines};
 use rohrpost::output::{LINES, OutputLine};
@@ -38,8 +38,7 @@ fn told(place: &Place, words: &str) -> String {
 
 #[test]
 fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let (me, victim) = (tool.link.me(), robot.name("probe.0"));
     let time_ns = tool.clock.now().ns;
@@ -60,7 +59,7 @@ fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
         assert!(send(&robot, &mut tool, from, &line));
     }
     let expected = RefusedLines { foreign_name: 2, other_system: 2, ahead: 1, losses: 1, ..RefusedLines::default() };
-    wait("all lines are checked", || (refused(&robot, &mut tool) == expected).then_some(()));
+    until("all lines are checked", || refused(&robot, &mut tool) == expected);
     let log = told(&place, "lines in the name of others were dropped");
     assert!(!log.contains("forged") && !log.contains("by another system"), "{log}");
     assert!(log.contains(": said in its own name"), "{log}");
@@ -73,9 +72,8 @@ fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
 
 #[test]
 fn a_module_with_endless_lines_has_its_share_and_lines_of_others_stay() {
-    let place = Place::new();
     let ring = format!("[output]\nring = {RING}\n");
-    let (mut launch, robot) = place.launched(&[&ring, OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&ring, OUTPUT, &probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let before = told(&place, "probe.0:");
     let of_probe: Vec<&str> = before.lines().filter(|line| line.contains("probe.0:")).collect();
@@ -84,9 +82,9 @@ fn a_module_with_endless_lines_has_its_share_and_lines_of_others_stay() {
     let text = "noise".into();
     let line =
         OutputLine { time_ns, module: me.raw(), level: OutputLevel::Info, lost: 0, suppressed: 0, errno: None, text };
-    wait("its share is used up", || {
+    until("its share is used up", || {
         (0..5000).for_each(|_| _ = send(&robot, &mut tool, me, &line));
-        (refused(&robot, &mut tool).beyond_share > 0).then_some(())
+        refused(&robot, &mut tool).beyond_share > 0
     });
     let after = told(&place, "more than the share of the principal of tool.");
     let noise = after.lines().filter(|line| line.ends_with("noise")).count();

@@ -1,24 +1,16 @@
 //! `rohrpost log --file`: lines of output from recordings, without a robot.
 
-use crate::harness::Place;
+use crate::harness::{Place, head};
+use crate::recordings::{self, channel, session};
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
 use rohrpost::output::OutputLine;
 use rohrpost::schema::{Members, Schema, Type};
 use rohrpost::wire::append;
-use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+use rohrpost_recording::{Message, Session};
 use std::collections::BTreeMap;
 
-const CONFIG: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-pilot = { id = 140 }
-motor = { id = 200 }
-output = { id = 32 }
-tool = { id = 16 }
+const MODULES: &str = r#"
 [nodes.main]
 [[module]]
 name = "output.0"
@@ -32,6 +24,10 @@ name = "pilot.0"
 program = "true"
 "#;
 
+fn config() -> String {
+    head("pilot 140, motor 200, output 32, tool 16") + MODULES
+}
+
 /// 2023-11-14, 22:13:20.
 const BEGIN_NS: u64 = 1_700_000_000_000_000_000;
 
@@ -42,13 +38,9 @@ type Said<'a> = (u64, u8, OutputLevel, &'a str);
 fn recorded(place: &Place, stem: &str, config: &str, lines: &[Said<'_>]) -> String {
     let configuration = BTreeMap::from([("saved.toml".into(), "odd = 1".into()), ("test.toml".into(), config.into())]);
     let session = Session { node: "main".into(), configuration, ..Session::default() };
-    let options = Options { leave_bytes: 0, ..Options::new(place.path(""), stem) };
-    let mut writer = Writer::start(options, session).unwrap();
-    let lines_channel =
-        ChannelSpec { name: "output.0", item: "line", ty: &OutputLine::schema(), texts: BTreeMap::new() };
-    let lines_channel = writer.channel(&lines_channel).unwrap();
-    let speed = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
-    let speed = writer.channel(&speed).unwrap();
+    let mut writer = recordings::begin(place, stem, session);
+    let lines_channel = channel(&mut writer, "output.0", "line", &OutputLine::schema());
+    let speed = channel(&mut writer, "motor.0", "speed", &Type::U8);
     for (number, (second, class, level, text)) in (0..).zip(lines) {
         let time_ns = BEGIN_NS + second * 1_000_000_000;
         let module = Name::new(1, *class, 0, 0).raw();
@@ -60,8 +52,7 @@ fn recorded(place: &Place, stem: &str, config: &str, lines: &[Said<'_>]) -> Stri
         writer.write(lines_channel, &message).unwrap();
         writer.write(speed, &Message { data: &[7], ..message }).unwrap();
     }
-    writer.finish().1.unwrap();
-    place.path(&format!("{stem}-0001.mcap")).to_str().unwrap().to_owned()
+    recordings::end(place, stem, writer).to_str().unwrap().to_owned()
 }
 
 const FIRST: [Said<'static>; 3] = [
@@ -74,7 +65,7 @@ const SECOND: [Said<'static>; 2] = [(1, 200, OutputLevel::Info, "is on"), (100, 
 #[test]
 fn lines_of_recordings_are_shown_as_those_of_a_robot() {
     let place = Place::new();
-    let files = [recorded(&place, "b", CONFIG, &FIRST), recorded(&place, "a", CONFIG, &SECOND)];
+    let files = [recorded(&place, "b", &config(), &FIRST), recorded(&place, "a", &config(), &SECOND)];
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
     let log = |arguments: &[&str]| place.say(&[&["log", "--file"], &files[..], arguments].concat()).ok();
     let all = [
@@ -110,7 +101,7 @@ fn lines_of_recordings_are_shown_as_those_of_a_robot() {
 #[test]
 fn what_a_recording_lacks_is_told() {
     let place = Place::new();
-    let file = recorded(&place, "a", CONFIG, &FIRST);
+    let file = recorded(&place, "a", &config(), &FIRST);
     let bytes = std::fs::read(&file).unwrap();
     let (open, strange) = (place.path("open.mcap"), place.path("odd.toml"));
     std::fs::write(&open, &bytes[..bytes.len() - 1]).unwrap();
@@ -118,7 +109,7 @@ fn what_a_recording_lacks_is_told() {
     let lines: Vec<&str> = said.lines().collect();
     assert!(lines[0].starts_with("… ") && lines[0].contains("open.mcap was not closed: "), "{said}");
     assert_eq!(lines[1..], ["22:14:50.000 error main/motor.0: stalls", "\tsince long (errno 5: Input/output error)"]);
-    let other = CONFIG.replace("pilot", "driver").replace("\"test\"", "\"other\"");
+    let other = config().replace("pilot", "driver").replace("\"test\"", "\"other\"");
     std::fs::write(&strange, &other).unwrap();
     let strange = strange.to_str().unwrap();
     let said = place.say(&["log", "--file", &file, "--config", strange, "--module", "driver.0"]).ok();
@@ -130,8 +121,7 @@ fn what_a_recording_lacks_is_told() {
         (&["log", "--file", &file, "--level", "pilot.0=warn"], "write --level warn --module pilot.0"),
         (&["log", "--file", strange], "is no MCAP file"),
     ] {
-        let said = place.say(arguments).fails();
-        assert!(said.contains(words), "{arguments:?}: {said}");
+        place.say(arguments).fails_with([words]);
     }
     let said = place.say(&["log", "--file", &file, "--follow"]);
     assert!(said.code == Some(2) && said.err.contains("cannot be used with"), "{said:?}");
@@ -147,13 +137,10 @@ fn what_a_recording_lacks_is_told() {
 #[test]
 fn a_recording_without_lines_says_so() {
     let place = Place::new();
-    let session =
-        Session { configuration: BTreeMap::from([("test.toml".into(), CONFIG.into())]), ..Session::default() };
-    let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), "a") }, session).unwrap();
-    let speed = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
-    writer.channel(&speed).unwrap();
-    writer.finish().1.unwrap();
-    let said = place.say(&["log", "--file", place.path("a-0001.mcap").to_str().unwrap()]).ok();
+    let mut writer = recordings::begin(&place, "a", session("", "test.toml", &config()));
+    channel(&mut writer, "motor.0", "speed", &Type::U8);
+    let file = recordings::end(&place, "a", writer);
+    let said = place.say(&["log", "--file", file.to_str().unwrap()]).ok();
     assert!(said.starts_with("… ") && said.contains("has no lines of output; `output = true`"), "{said}");
 }
 
@@ -161,18 +148,15 @@ fn a_recording_without_lines_says_so() {
 #[test]
 fn lines_of_another_version_are_refused_in_words() {
     let place = Place::new();
-    let configuration = BTreeMap::from([("test.toml".into(), CONFIG.into())]);
-    let session = Session { configuration, ..Session::default() };
-    let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), "a") }, session).unwrap();
+    let mut writer = recordings::begin(&place, "a", session("", "test.toml", &config()));
     let Type::Struct(mut older) = OutputLine::schema() else { panic!("a line is a struct") };
     let Members::Fields(fields) = &mut older.members else { panic!("with fields") };
     fields.retain(|field| field.name != "errno");
-    let line = ChannelSpec { name: "output.0", item: "line", ty: &Type::Struct(older), texts: BTreeMap::new() };
-    let line = writer.channel(&line).unwrap();
+    let line = channel(&mut writer, "output.0", "line", &Type::Struct(older));
     let message = Message { arrival_ns: BEGIN_NS, stamp_ns: BEGIN_NS, epoch: 1, sequence: 0, data: &[0; 6] };
     writer.write(line, &message).unwrap();
-    writer.finish().1.unwrap();
-    let said = place.say(&["log", "--file", place.path("a-0001.mcap").to_str().unwrap()]).ok();
+    let file = recordings::end(&place, "a", writer);
+    let said = place.say(&["log", "--file", file.to_str().unwrap()]).ok();
     let words = "output.0/line has lines of another version; `rohrpost record export --format json` shows them";
     assert!(said.contains(words) && said.lines().count() == 1, "{said}");
 }

@@ -2,14 +2,12 @@
 //! its beginning again when it is played anew. What modules do before it begins is in their journals.
 
 use crate::exact::count;
-use crate::harness::{PATIENCE, Place, Robot, probe, wait};
+use crate::harness::{PATIENCE, Place, Robot, head, probe, until, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use crate::recorded::{RECORD, launched};
 use rohrpost::ToolLink;
-use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{RecorderInterface, RecordingState};
-use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{StreamId, SystemClock, TimeSource, monotonic_ns};
 use rohrpost_modules::journal::JOURNAL_NUMBER;
 use std::path::PathBuf;
@@ -19,21 +17,8 @@ const BEGIN_S: u64 = 1_000_000_000;
 /// Of the probe's ticks, in the node's time.
 const PERIOD_NS: u64 = 250_000_000;
 
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-player = { id = 170 }
-odometry = { id = 160 }
-laser = { id = 150 }
-probe = { id = 96 }
-mapper = { id = 95 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
+const CLASSES: &str = "player 170, odometry 160, laser 150, probe 96, mapper 95, logd 24, tool 16";
+const TIME: &str = r#"
 [nodes.main]
 [time]
 source = "log"
@@ -42,7 +27,7 @@ source = "log"
 /// Writes the log that the player plays when it is started: one that lasts longer than any test.
 fn write_log(place: &Place, begin_s: u64) {
     let line = |s: u64| format!("ODOM 0 0 0 0 0 0 {s}.0 host 0\n");
-    std::fs::write(place.path("next.log"), (begin_s..begin_s + 50_000).map(line).collect::<String>()).unwrap();
+    place.write("next.log", (begin_s..begin_s + 50_000).map(line).collect::<String>());
     // A player that runs goes on with the one that it has.
     std::fs::rename(place.path("next.log"), place.path("long.log")).unwrap();
 }
@@ -54,11 +39,9 @@ fn robot(place: &Place, speed: f64, player_keys: &str) -> (Running, Robot, PathB
         "[[module]]\nname = \"player.0\"\naliases = [\"odometry.0\", \"laser.0\"]\nbuiltin = \"carmen\"\n\
          settings = {{ file = \"long.log\", speed = {speed:?} }}\n{player_keys}\n"
     );
-    let config = place.path("test.toml");
-    std::fs::write(&config, [HEAD, &probe("probe.0", "rate-hz = 4.0", ""), &player].concat()).unwrap();
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let config =
+        place.write("test.toml", [&head(CLASSES), TIME, &probe("probe.0", "rate-hz = 4.0", ""), &player].concat());
+    let (launch, robot) = place.launched_from(&config);
     (launch, robot, config)
 }
 
@@ -71,9 +54,7 @@ struct Beat {
 
 /// The probe's last tick, if there was one.
 fn beat(robot: &Robot, tool: &mut ToolLink) -> Option<Beat> {
-    let port = ProbingInterface::BEAT;
-    let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-    let newest = tool.call(robot.name("probe.0"), GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
+    let newest = robot.newest(tool, "probe.0", ProbingInterface::BEAT);
     newest.ok().map(|(stamp_ns, number)| Beat { number, stamp_ns })
 }
 
@@ -102,8 +83,7 @@ fn ticks_come_at_the_pace_of_the_log() {
         // A busy computer leaves some out. By the computer's clock there would be a tenth at ten times the pace.
         assert!((passed / 5..=passed).contains(&ticks), "{ticks} ticks in {passed} periods at {speed}");
         tool.close();
-        launch.stop();
-        place.assert_empty();
+        place.end(&mut launch);
     }
 }
 
@@ -118,7 +98,7 @@ fn there_is_no_tick_while_the_log_stands_still_and_they_go_on_after_a_step_back(
     let (before, at_ns) = (settled(&robot, &mut tool).unwrap(), clock.now().ns);
     // Time for 20 ticks, if it passed.
     let since_ns = monotonic_ns();
-    wait("half a second of the computer", || (monotonic_ns() - since_ns > 2 * PERIOD_NS).then_some(()));
+    until("half a second of the computer", || monotonic_ns() - since_ns > 2 * PERIOD_NS);
     assert_eq!((settled(&robot, &mut tool), clock.now().ns), (Some(before), at_ns));
     place.say(&["call", "player.0", "on"]).ok();
     let after = wait("ticks go on", || beat(&robot, &mut tool).filter(|beat| beat.number >= before.number + 3));
@@ -134,8 +114,7 @@ fn there_is_no_tick_while_the_log_stands_still_and_they_go_on_after_a_step_back(
     });
     assert_eq!(clock.record().unwrap().epoch, epoch + 1, "{again:?}");
     tool.close();
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
@@ -152,14 +131,12 @@ fn before_the_log_begins_there_is_no_time_and_tools_say_so() {
     assert_eq!(json["time_known"], false, "{json}");
     let told = place.say(&["time"]);
     assert!(told.code == Some(1) && told.out.contains("main: it has no time yet: that of the log"), "{told:?}");
-    let told = place.say(&["ping", "probe.0", "--count", "1"]).ok();
-    assert!(told.contains("the time of this node stands still"), "{told}");
+    place.say(&["ping", "probe.0", "--count", "1"]).ok_with(["the time of this node stands still"]);
     place.say(&["call", "player.0", "on"]).ok();
     wait("a first tick", || beat(&robot, &mut tool));
     assert!(top().contains("log x 2\n"), "{}", top());
     tool.close();
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
@@ -186,11 +163,11 @@ fn what_a_module_does_before_the_log_begins_is_recorded_and_repeated() {
     }
     place.say(&["call", "player.0", "on"]).ok();
     let file = place.path("recordings/main-0001.mcap");
-    wait("the journal is recorded", || (count(&file, "mapper.0", |_| true) > 0).then_some(()));
+    until("the journal is recorded", || count(&file, "mapper.0", |_| true) > 0);
     tool.close();
     launch.stop();
     let words = ["replay", "--exact", "--run-recorded", "--json", file.to_str().unwrap(), "mapper.0"];
-    let told = Running::start(place.command(&words)).said();
+    let told = place.start(&words).said();
     let run: serde_json::Value = serde_json::from_str(&told.out).unwrap_or_else(|_| panic!("{told:?}"));
     assert_eq!((told.code, &run["result"]), (Some(0), &"identical".into()), "{told:?}");
     place.assert_empty();
@@ -199,20 +176,15 @@ fn what_a_module_does_before_the_log_begins_is_recorded_and_repeated() {
 /// Then there is no time at which anything could arrive, but the recorder does its work: it looks, and says how it is.
 #[test]
 fn before_a_log_begins_modules_are_found_and_nothing_is_recorded() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, &["[time]\nsource = \"log\"\n", RECORD].concat());
+    let (place, mut launch, robot) = launched(&["[time]\nsource = \"log\"\n", RECORD].concat());
     let mut tool = robot.tool(PATIENCE);
-    let port = RecorderInterface::STATE;
     // Published with each look.
     let state: RecordingState = wait("the recorder says how it is", || {
-        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let read = |bytes: &[u8]| from_bytes::<(u64, RecordingState)>(bytes);
-        let said = tool.call(robot.name("logd.0"), GET_DATA, (port.hash)(), write, read);
+        let said = robot.newest(&mut tool, "logd.0", RecorderInterface::STATE);
         // Two feeders have two items each; and there are the collector's lines.
         said.ok().map(|(_, state)| state).filter(|state| state.channels == 5)
     });
     assert_eq!((state.written, state.lost, state.waiting), (0, 0, 0), "{state:?}");
     tool.close();
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

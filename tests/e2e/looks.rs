@@ -1,6 +1,6 @@
 //! Launch shows its node page by page to tools without access to its shared memory. Here a tool with access compares.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, until};
 use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
 use rohrpost::wire::{append, from_bytes};
@@ -41,13 +41,12 @@ fn kinds(flows: &[FlowInfo], looker: Name) -> Vec<(u32, Name, Name, i16)> {
 
 #[test]
 fn a_look_from_afar_shows_what_a_look_from_near_does() {
-    let place = Place::new();
     // No collector: launch's first line to it would be a flow that only some snapshots show.
-    let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", ""), &probe("probe.1", "", "")]);
+    let (place, _launch, robot) = Place::running(&[&probe("probe.0", "rate-hz = 50.0", ""), &probe("probe.1", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     tool.status(robot.name("probe.0")).unwrap();
-    wait("the probe publishes", || robot.node.traffic().iter().any(FlowInfo::is_publication).then_some(()));
-    std::fs::write(place.path("picture"), "pixels").unwrap();
+    until("the probe publishes", || robot.node.traffic().iter().any(FlowInfo::is_publication));
+    place.write("picture", "pixels");
     place.say(&["stream", "write", "probe.0", "7", "picture"]).ok();
     let before = survey(&mut tool, Scope::All);
     let near = Survey::new(&robot.node, &robot.installation, "main").unwrap();
@@ -85,13 +84,12 @@ fn a_look_from_afar_shows_what_a_look_from_near_does() {
 
 #[test]
 fn a_look_is_no_larger_than_what_is_asked_for() {
-    let place = Place::new();
-    let (_launch, robot) =
-        place.launched(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", ""), &probe("probe.1", "", "")]);
+    let (place, _launch, robot) =
+        Place::running(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", ""), &probe("probe.1", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let probe = robot.name("probe.0");
-    wait("the probe publishes", || robot.node.traffic().iter().any(FlowInfo::is_publication).then_some(()));
-    std::fs::write(place.path("picture"), "pixels").unwrap();
+    until("the probe publishes", || robot.node.traffic().iter().any(FlowInfo::is_publication));
+    place.write("picture", "pixels");
     for module in ["probe.0", "probe.1"] {
         place.say(&["stream", "write", module, "7", "picture"]).ok();
     }
@@ -115,8 +113,7 @@ fn a_look_is_no_larger_than_what_is_asked_for() {
 
 #[test]
 fn a_mailbox_is_shown_down_to_its_slots() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (_place, _launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let name = robot.name("probe.0");
     let pid = robot.pid("probe.0");
@@ -135,8 +132,7 @@ fn a_mailbox_is_shown_down_to_its_slots() {
 
 #[test]
 fn another_version_is_refused_and_an_old_look_is_gone() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (_place, _launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let launcher = tool.launcher();
     let mut ask = |function, write: &dyn Fn(&mut Vec<u8>)| {
@@ -169,8 +165,7 @@ fn another_version_is_refused_and_an_old_look_is_gone() {
 
 #[test]
 fn a_launch_that_stands_is_silent_in_time() {
-    let place = Place::new();
-    let (launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (_place, launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let launcher = tool.launcher();
     halt(launch.pid());

@@ -1,6 +1,6 @@
 //! `rohrpost mailbox`: a mailbox with a stopped receiver, seen from outside.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, assert_has, halt, probe, until};
 use crate::process::Running;
 use crate::versions::write_version;
 use nix::sys::signal::Signal;
@@ -41,9 +41,8 @@ fn file_of(robot: &Robot, name: &str) -> PathBuf {
 
 #[test]
 fn a_full_mailbox_of_a_stopped_receiver_shows_its_senders_and_losses() {
-    let place = Place::new();
     let keys = "stop-within = \"200 ms\"\n[module.mailbox.commands]\nslots = 4\nmax-age = \"90 s\"";
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", keys)]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", keys)]);
     let looked = place.say(&["mailbox", "probe.0", "--json"]).json();
     assert_eq!((&looked["waiting"], &looked["receiver"]["stopped"]), (&0.into(), &false.into()));
     let pid = robot.pid("probe.0");
@@ -56,8 +55,7 @@ fn a_full_mailbox_of_a_stopped_receiver_shows_its_senders_and_losses() {
     // Both before one dies: else the other takes its place in the node's table, and its number is lost.
     let (mut dead, alive) = (fill(&robot), fill(&robot));
     let dead_pid = dead.pid();
-    dead.signal(Signal::SIGKILL);
-    dead.end();
+    dead.kill();
 
     let looked = place.say(&["mailbox", "probe.0", "--json"]).json();
     for (key, value) in [
@@ -92,27 +90,27 @@ fn a_full_mailbox_of_a_stopped_receiver_shows_its_senders_and_losses() {
     }
 
     let text = place.say(&["mailbox", "probe.0"]).ok();
-    for words in [
-        "mailbox 1.probe.0.0: commands of probe.0, node main\n",
-        &format!("probe.0, process {pid}, which is stopped\n"),
-        "4 x 1024 B",
-        "displace: a more important package replaces",
-        "what has waited 90.0 s\n",
-        "1 refused",
-        "ready    tool (16)",
-        &format!("by probe.7, process {dead_pid}, which is dead; displaced a package of tool (16)\n"),
-        &format!("by probe.7, process {}; displaced a package of tool (16)\n", alive.pid()),
-    ] {
-        assert!(text.contains(words), "no `{words}` in:\n{text}");
-    }
+    assert_has(
+        &text,
+        [
+            "mailbox 1.probe.0.0: commands of probe.0, node main\n",
+            &format!("probe.0, process {pid}, which is stopped\n"),
+            "4 x 1024 B",
+            "displace: a more important package replaces",
+            "what has waited 90.0 s\n",
+            "1 refused",
+            "ready    tool (16)",
+            &format!("by probe.7, process {dead_pid}, which is dead; displaced a package of tool (16)\n"),
+            &format!("by probe.7, process {}; displaced a package of tool (16)\n", alive.pid()),
+        ],
+    );
     launch.stop();
 }
 
 #[test]
 fn waits_are_drawn_and_a_dead_receiver_is_named() {
-    let place = Place::new();
     let restart = "restart = { policy = \"always\", backoff = \"60 s\" }";
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", restart)]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", restart)]);
     (1..=3).for_each(|count: u32| drop(place.say(&["call", "probe.0", "count", &count.to_string()]).ok()));
     let looked = place.say(&["mailbox", "probe.0", "--json"]).json();
     let tool = looked["classes"].as_array().unwrap().iter().find(|class| class["class"] == "tool").unwrap();
@@ -120,20 +118,18 @@ fn waits_are_drawn_and_a_dead_receiver_is_named() {
     let packages: u64 = bars.iter().map(|bar| bar["packages"].as_u64().unwrap()).sum();
     assert_eq!(Some(packages), tool["received"].as_u64(), "{tool:#}");
     assert!(packages >= 3 && bars.windows(2).all(|pair| pair[0]["to_s"] == pair[1]["from_s"]), "{tool:#}");
-    let text = place.say(&["mailbox", "probe.0"]).ok();
-    assert!(text.contains("tool waited\n") && text.contains("████\n") && text.contains("0-31  free\n"), "{text}");
+    place.say(&["mailbox", "probe.0"]).ok_with(["tool waited\n", "████\n", "0-31  free\n"]);
 
     let pid = robot.pid("probe.0");
     crate::harness::signal(pid, Signal::SIGKILL);
     let line = format!("nobody; the last was probe.0, process {pid}, which is dead\n");
-    wait("the tool sees its death", || place.say(&["mailbox", "probe.0"]).ok().contains(&line).then_some(()));
+    until("the tool sees its death", || place.say(&["mailbox", "probe.0"]).ok().contains(&line));
     launch.stop();
 }
 
 #[test]
 fn mailboxes_that_are_not_there_or_not_ours_are_told_with_what_would_be_right() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     for (name, words) in [
         ("probe.0.77", "probe.0 has no mailbox `probe.0.77`; it has probe.0, probe.0.1, probe.0.2"),
         (
@@ -143,18 +139,16 @@ fn mailboxes_that_are_not_there_or_not_ours_are_told_with_what_would_be_right() 
         ("porbe.0", "there is no class `porbe`; did you mean `probe`?"),
         ("prob", "`prob` is no mailbox name; write class.instance"),
     ] {
-        let told = place.say(&["mailbox", name]).fails();
-        assert!(told.contains(words), "{name}: {told}");
+        place.say(&["mailbox", name]).fails_with([words]);
     }
     let file = file_of(&robot, "probe.0");
     write_version(&file, 99);
-    let told = place.say(&["mailbox", "probe.0"]).fails();
-    assert!(told.contains(&format!("another version (layout 99, this program {LAYOUT_VERSION})")), "{told}");
+    let said = place.say(&["mailbox", "probe.0"]);
+    said.fails_with([&format!("another version (layout 99, this program {LAYOUT_VERSION})")]);
     write_version(&file, LAYOUT_VERSION);
     // Beside the mailbox, as a foreign file.
     std::fs::write(robot.node.path().join("01600900.mbx"), b"a letter").unwrap();
-    let told = place.say(&["mailbox", "probe.9"]).fails();
-    assert!(told.contains("mailbox probe.9: its file is no mailbox, or damaged"), "{told}");
+    place.say(&["mailbox", "probe.9"]).fails_with(["mailbox probe.9: its file is no mailbox, or damaged"]);
     assert!(place.say(&["list", "-m"]).ok().contains("1.probe.0.0"), "the others are listed all the same");
     launch.stop();
 }

@@ -1,6 +1,6 @@
 //! The measuring tools, compared with a source that keeps its own record; and observing changes nothing.
 
-use crate::harness::{PATIENCE, Place, Robot, patient, probe, wait};
+use crate::harness::{PATIENCE, Place, Robot, json_lines, patient, probe, until, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe};
@@ -13,7 +13,7 @@ use std::time::Duration;
 pub(crate) fn lines(tool: &Running) -> Vec<Value> {
     let out = tool.out();
     let whole = out.rsplit_once('\n').map_or("", |(whole, _)| whole);
-    whole.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    json_lines(whole)
 }
 
 pub(crate) fn last(tool: &Running, holds: impl Fn(&Value) -> bool) -> Option<Value> {
@@ -68,32 +68,30 @@ fn take_slowly(data: &mut Receiver, taken: &mut Vec<Taken>) {
 
 #[test]
 fn figures_agree_with_a_known_source() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[&probe("probe.0", "blob-hz = 150.0", "start = \"off\"")]);
+    let (place, _launch, robot) = Place::running(&[&probe("probe.0", "blob-hz = 150.0", "start = \"off\"")]);
     let mut tool = robot.tool(PATIENCE);
     let wish = Subscribe { number: 3, id: 1, period_us: 0, lease_ms: 60_000, mailbox: local::DATA };
     tool.data().unwrap();
     let write = |body: &mut Vec<u8>| append(body, &wish);
-    wait("probe.0 is ready", || (robot.state("probe.0") == "off").then_some(()));
+    until("probe.0 is ready", || robot.state("probe.0") == "off");
     tool.call(robot.name("probe.0"), SUBSCRIBE, ProbingInterface::hash(), write, |_| Ok(())).unwrap();
     let me = robot.installation.classes.format(tool.link.me());
-    let start =
-        |arguments: &[&str]| Running::start(place.command(&[arguments, &["--json", "--window", "1000"]].concat()));
+    let start = |arguments: &[&str]| place.start(&[arguments, &["--json", "--window", "1000"]].concat());
     let hz = start(&["hz", "probe.0", "blob"]);
     let bw = start(&["bw", "probe.0", "blob"]);
     let bw_in = start(&["bw", &me]);
     let delay = start(&["delay", "probe.0"]);
     let mut tools = [hz, bw, bw_in, delay];
     for tool in &mut tools {
-        wait("its first line, before anything is published", || {
+        until("its first line, before anything is published", || {
             tool.assert_runs();
-            (!lines(tool).is_empty()).then_some(())
+            !lines(tool).is_empty()
         });
     }
     let mut taken = Vec::new();
     // Packages are taken meanwhile: the mailbox has room for less than a second of them.
     let order = |data: &mut Receiver, taken: &mut Vec<Taken>, word| {
-        let mut said = Running::start(place.command(&patient(&["call", "probe.0", word])));
+        let mut said = place.start(&patient(&["call", "probe.0", word]));
         let done = wait("it is done", || {
             take_slowly(data, taken);
             said.ended()
@@ -101,15 +99,15 @@ fn figures_agree_with_a_known_source() {
         assert!(done.success(), "{}", said.err());
     };
     order(tool.data().unwrap(), &mut taken, "on");
-    wait("500 values", || {
+    until("500 values", || {
         take_slowly(tool.data().unwrap(), &mut taken);
-        (taken.len() >= 500).then_some(())
+        taken.len() >= 500
     });
     order(tool.data().unwrap(), &mut taken, "off");
     let source = published(&place);
-    wait("all values", || {
+    until("all values", || {
         take_slowly(tool.data().unwrap(), &mut taken);
-        (taken.len() >= source.len()).then_some(())
+        taken.len() >= source.len()
     });
     let all = source.len() as u64;
     assert_eq!(taken.len(), source.len());
@@ -212,9 +210,8 @@ fn assert_same(now: &str, before: &str) {
 
 #[test]
 fn looking_changes_nothing() {
-    let place = Place::new();
-    let (_launch, robot) =
-        place.launched(&[&probe("probe.0", "rate-hz = 100.0", ""), &probe("probe.1", "rate-hz = 30.0", "")]);
+    let (place, _launch, robot) =
+        Place::running(&[&probe("probe.0", "rate-hz = 100.0", ""), &probe("probe.1", "rate-hz = 30.0", "")]);
     let incarnation = || {
         let tool = robot.tool(PATIENCE);
         let incarnation = tool.link.participant().incarnation();
@@ -239,7 +236,7 @@ fn looking_changes_nothing() {
         &["top", "--once", "--interval", "0.5"],
     ]
     .into_iter()
-    .map(|arguments| Running::start(place.command(arguments)))
+    .map(|arguments| place.start(arguments))
     .collect();
     for tool in watching {
         tool.said().ok();

@@ -1,16 +1,14 @@
 //! The measuring tools with a source that never was, stops, dies, or is launched again.
 
-use crate::harness::{Place, halt, probe, signal, wait};
+use crate::harness::{Place, halt, probe, signal, until, wait};
 use crate::measure::{last, lines};
-use crate::process::Running;
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
 #[test]
 fn hz_tells_what_is_silent_and_what_does_not_exist() {
-    let place = Place::new();
-    let (mut launch, robot) =
-        place.launched(&[&probe("probe.0", "rate-hz = 50.0", "restart = { policy = \"never\" }")]);
+    let (place, mut launch, robot) =
+        Place::running(&[&probe("probe.0", "rate-hz = 50.0", "restart = { policy = \"never\" }")]);
     let text = place.say(&["hz", "probe.0", "--count", "1"]).ok();
     let [beat, silence, blob] = text.lines().collect::<Vec<_>>()[..] else { panic!("{text}") };
     assert!(beat.starts_with("beat     ") && beat.contains(" Hz  mean ") && beat.contains(" values"), "{text}");
@@ -27,9 +25,9 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
     }
     // A stopped source is not called slow.
     halt(robot.pid("probe.0"));
-    let text = place.say(&["hz", "probe.0", "beat", "--seconds", "0.3"]).ok();
-    assert!(text.contains("nothing new in this window; the last value was sent "), "{text}");
-    let mut hz = Running::start(place.command(&["hz", "probe.0", "beat"]));
+    let said = place.say(&["hz", "probe.0", "beat", "--seconds", "0.3"]);
+    said.ok_with(["nothing new in this window; the last value was sent "]);
+    let mut hz = place.start(&["hz", "probe.0", "beat"]);
     hz.wait_for("nothing new");
     signal(robot.pid("probe.0"), Signal::SIGKILL);
     launch.wait_for("probe.0");
@@ -39,10 +37,9 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
 
 #[test]
 fn what_stops_is_silent_and_no_longer_as_quick_as_it_was() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let (place, _launch, robot) = Place::running(&[&probe("probe.0", "rate-hz = 50.0", "")]);
     let mut tools = [["hz", "probe.0", "beat", "--json"], ["bw", "probe.0", "beat", "--json"]]
-        .map(|arguments| Running::start(place.command(&arguments)));
+        .map(|arguments| place.start(&arguments));
     let names = [["values", "values_per_s"], ["packages", "packages_per_s"]];
     for (tool, [count, _]) in tools.iter().zip(names) {
         wait("it goes on", || last(tool, |line| line[count].as_u64() >= Some(20) && line["silent_s"].is_null()));
@@ -61,17 +58,16 @@ fn what_stops_is_silent_and_no_longer_as_quick_as_it_was() {
         assert!(after[per_s].as_f64().is_none_or(|later| later < rate), "{line} {after}");
         tool.stop();
     }
-    let text = place.say(&["hz", "probe.0", "beat", "--count", "1"]).ok();
-    assert!(text.contains("nothing new in this window; the last value was sent "), "{text}");
+    let said = place.say(&["hz", "probe.0", "beat", "--count", "1"]);
+    said.ok_with(["nothing new in this window; the last value was sent "]);
     signal(robot.pid("probe.0"), Signal::SIGCONT);
 }
 
 #[test]
 fn a_node_that_is_launched_again_is_found_again() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "rate-hz = 50.0", "")]);
     let config = robot.installation.path.clone();
-    let start = |arguments: &[&str]| Running::start(place.command(arguments));
+    let start = |arguments: &[&str]| place.start(arguments);
     let mut tools = [
         start(&["hz", "probe.0", "beat", "--json"]),
         start(&["bw", "probe.0", "beat", "--json"]),
@@ -83,18 +79,15 @@ fn a_node_that_is_launched_again_is_found_again() {
     for tool in &tools {
         wait("a value", || last(tool, |line| values(line) > 1));
     }
-    drop(robot);
     launch.stop();
     for tool in &tools {
-        wait("that launch has ended", || tool.err().contains("waiting until it is launched again").then_some(()));
+        until("that launch has ended", || tool.err().contains("waiting until it is launched again"));
     }
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (_launch, _robot) = place.launched_from(&config);
     for tool in &mut tools {
-        wait("that it is there again", || tool.err().contains("node `main` was launched again").then_some(()));
+        until("that it is there again", || tool.err().contains("node `main` was launched again"));
         let before = lines(tool).len();
-        wait("values of the new one", || lines(tool)[before..].iter().any(|line| values(line) > 1).then_some(()));
+        until("values of the new one", || lines(tool)[before..].iter().any(|line| values(line) > 1));
         tool.stop();
     }
 }

@@ -1,7 +1,6 @@
 //! A module moves to another computer by its `node =` alone: the demo's mapper, beside the scanner and away from it.
 
 use crate::harness::{Place, lacks_namespaces};
-use std::path::Path;
 
 /// What a demo says of its map, and of the scans that the other node of its mapper got.
 #[derive(Debug)]
@@ -17,8 +16,7 @@ struct Mapped {
 impl Mapped {
     /// Runs the demo with its mapper on a node; none where there are no namespaces.
     fn on(place: &Place, text: &str) -> Option<Self> {
-        let config = place.path("nodes.toml");
-        std::fs::write(&config, text).unwrap();
+        let config = place.write("nodes.toml", text);
         let config = config.to_str().unwrap();
         place.say(&["check", config]).ok();
         let said = place.say(&["demo", "--nodes", "3", "--config", config, "--seconds", "10", "--no-gui", "--quiet"]);
@@ -52,14 +50,14 @@ fn numbers(text: &str) -> Vec<u64> {
 
 #[test]
 fn the_mapper_moves_to_another_node_by_one_line() {
-    let (place, folder) = (Place::new(), Path::new(env!("CARGO_MANIFEST_DIR")).join("../config"));
-    std::fs::copy(folder.join("building.map"), place.path("building.map")).unwrap();
-    let there = std::fs::read_to_string(folder.join("demo-nodes.toml")).unwrap();
+    let place = Place::new();
+    place.copy("config/building.map");
+    let there = include_str!("../../config/demo-nodes.toml");
     let on = |node: &str| format!("name = \"mapper.0\"\nnode = \"{node}\"\n");
     let here = there.replacen(&on("brain"), &on("base"), 1);
     assert_eq!(here.lines().zip(there.lines()).filter(|(here, there)| here != there).count(), 1);
     let Some(here) = Mapped::on(&place, &here) else { return };
-    let Some(there) = Mapped::on(&place, &there) else { return };
+    let Some(there) = Mapped::on(&place, there) else { return };
     here.assert_good("beside the scanner");
     there.assert_good("on another node");
     // With poses of other times walls would be thicker.

@@ -1,6 +1,6 @@
 //! `rohrpost new`: its project is built, tested, launched and called, as its README says.
 
-use crate::harness::{Place, wait};
+use crate::harness::{Place, until, wait};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -22,8 +22,7 @@ fn cargo(project: &Path, command: &str) -> Command {
 
 /// Makes a project, builds it, and runs its own test.
 fn made_and_tested(place: &Place, words: &[&str]) -> PathBuf {
-    let made = place.say(&[&["new"], words].concat()).ok();
-    assert!(made.contains("cargo build && rohrpost launch robot.toml"), "{made}");
+    place.say(&[&["new"], words].concat()).ok_with(["cargo build && rohrpost launch robot.toml"]);
     let project = place.path(words[0]);
     compile_what_the_readme_writes(&project);
     // The versions that are here already.
@@ -65,13 +64,12 @@ fn a_new_camera_writes_pictures_of_1080_rows_in_place() {
     let place = Place::new();
     let project = made_and_tested(&place, &["eye", "--camera"]);
     let config = project.join("robot.toml");
-    let explained = place.say(&["check", config.to_str().unwrap()]).ok();
-    assert!(explained.contains("image"), "{explained}");
+    place.say(&["check", config.to_str().unwrap()]).ok_with(["image"]);
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
-    wait("eye.0 is on", || {
+    until("eye.0 is on", || {
         launch.assert_runs();
-        (robot.state("eye.0") == "on").then_some(())
+        robot.state("eye.0") == "on"
     });
     wait("it writes pictures", || {
         let listed = place.say(&["stream", "info", "eye.0", "1", "--json"]).json();
@@ -82,8 +80,7 @@ fn a_new_camera_writes_pictures_of_1080_rows_in_place() {
     // Sizes, format and length, and three bytes a pixel.
     let bytes = std::fs::metadata(picture).unwrap().len();
     assert!((1920 * 1080 * 3..1920 * 1080 * 3 + 32).contains(&bytes), "{bytes}");
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
     clean(&project, "eye");
 }
 
@@ -95,32 +92,28 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
     place.say(&["check", config.to_str().unwrap()]).ok();
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
-    wait("wind-vane.0 is on", || {
+    until("wind-vane.0 is on", || {
         launch.assert_runs();
-        (robot.state("wind-vane.0") == "on").then_some(())
+        robot.state("wind-vane.0") == "on"
     });
-    let offered = place.say(&["call", "wind-vane.0"]).ok();
-    assert!(offered.contains("restart <from: u64> -> u64") && offered.contains("The present count."), "{offered}");
+    place.say(&["call", "wind-vane.0"]).ok_with(["restart <from: u64> -> u64", "The present count."]);
     place.say(&["call", "wind-vane.0", "restart", "1000"]).ok();
     let count = place.say(&["echo", "wind-vane.0", "count", "--count", "1", "--json"]).json();
     assert!(count["value"].as_u64().unwrap() > 1000, "{count}");
     assert!(place.say(&["log"]).ok().contains("counts 10 times a second"));
     // Its parameter, as the README there changes it.
-    let listed = place.say(&["param", "get", "wind-vane.0"]).ok();
-    assert!(listed.contains("rate-hz") && listed.contains("Hz    0.1..=1000  Counts a second."), "{listed}");
+    place.say(&["param", "get", "wind-vane.0"]).ok_with(["rate-hz", "Hz    0.1..=1000  Counts a second."]);
     let set = place.say(&["param", "set", "wind-vane.0", "rate-hz", "200"]).ok();
     assert_eq!(set, "wind-vane.0 rate-hz: 10 -> 200 Hz\n");
-    let refused = place.say(&["param", "set", "wind-vane.0", "rate-hz", "0"]).fails();
-    assert!(refused.contains("out of range: 0.1..=1000 Hz"), "{refused}");
+    place.say(&["param", "set", "wind-vane.0", "rate-hz", "0"]).fails_with(["out of range: 0.1..=1000 Hz"]);
     // At ten a second it could not have counted so far in this time.
     let counted = || place.say(&["call", "wind-vane.0", "get", "count", "--json"]).json().as_u64().unwrap();
     let (first, began) = (counted(), std::time::Instant::now());
-    wait("it counts at the new rate", || {
+    until("it counts at the new rate", || {
         let elapsed_s = began.elapsed().as_secs_f64();
-        ((counted() - first) as f64 > 20.0 + 15.0 * elapsed_s).then_some(())
+        (counted() - first) as f64 > 20.0 + 15.0 * elapsed_s
     });
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
     clean(&project, "wind-vane");
 }
 
@@ -128,16 +121,13 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
 fn nothing_that_is_there_is_written_over() {
     let place = Place::new();
     std::fs::create_dir(place.path("arm")).unwrap();
-    std::fs::write(place.path("arm/notes"), "mine").unwrap();
-    let told = place.say(&["new", "arm"]).fails();
-    assert!(told.contains("arm is not empty; name another folder with --path DIR"), "{told}");
+    place.write("arm/notes", "mine");
+    place.say(&["new", "arm"]).fails_with(["arm is not empty; name another folder with --path DIR"]);
     assert_eq!(std::fs::read_dir(place.path("arm")).unwrap().count(), 1);
-    let told = place.say(&["new", "arm", "--path", "arm/notes"]).fails();
-    assert!(told.contains("arm/notes: Not a directory"), "{told}");
-    let told = place.say(&["new", "Arm"]).fails();
-    assert!(told.contains("a letter first: `arm`"), "{told}");
-    let told = place.say(&["new", "arm", "--path", "here", "--rohrpost", "arm"]).fails();
-    assert!(told.contains("arm holds no sources of Rohrpost; say where they are with --rohrpost DIR"), "{told}");
+    place.say(&["new", "arm", "--path", "arm/notes"]).fails_with(["arm/notes: Not a directory"]);
+    place.say(&["new", "Arm"]).fails_with(["a letter first: `arm`"]);
+    let said = place.say(&["new", "arm", "--path", "here", "--rohrpost", "arm"]);
+    said.fails_with(["arm holds no sources of Rohrpost; say where they are with --rohrpost DIR"]);
     assert!(!place.path("here").exists());
     place.say(&["new", "arm", "--path", "deep/er", "--rohrpost", ROOT]).ok();
     assert!(place.path("deep/er/src/lib.rs").exists());

@@ -1,9 +1,9 @@
 //! Names of files are bytes: one that is no text is a name like any other, for every command that takes a file.
 
-use crate::harness::{OUTPUT, Place, probe, wait};
+use crate::harness::{OUTPUT, Place, head, probe, until};
 use crate::process::{Running, Said};
-use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
-use std::collections::BTreeMap;
+use crate::recordings;
+use rohrpost_recording::Message;
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
@@ -29,16 +29,12 @@ fn said(place: &Place, words: &[&str]) -> Said {
 #[test]
 fn recordings_are_described_changed_and_replayed() {
     let place = Place::new();
-    let text = "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nlaser = { id = 100 }\n\
-                tool = { id = 16 }\n[nodes.main]\n[[module]]\nname = \"laser.0\"\nprogram = \"laser\"\n";
-    let configuration = BTreeMap::from([("robot.toml".to_owned(), text.to_owned())]);
-    let options = Options { leave_bytes: 0, ..Options::new(place.path(""), "main") };
-    let mut writer = Writer::start(options, Session { configuration, ..Session::default() }).unwrap();
-    let spec = ChannelSpec { name: "laser.0", item: "scan", ty: &rohrpost::schema::Type::U8, texts: BTreeMap::new() };
-    let scan = writer.channel(&spec).unwrap();
+    let module = "[nodes.main]\n[[module]]\nname = \"laser.0\"\nprogram = \"laser\"\n";
+    let session = recordings::session("", "robot.toml", &(head("laser 100, tool 16") + module));
+    let mut writer = recordings::begin(&place, "main", session);
+    let scan = recordings::channel(&mut writer, "laser.0", "scan", &rohrpost::schema::Type::U8);
     writer.write(scan, &Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence: 0, data: &[7] }).unwrap();
-    writer.finish().1.unwrap();
-    std::fs::rename(place.path("main-0001.mcap"), odd(&place, "ours.mcap")).unwrap();
+    std::fs::rename(recordings::end(&place, "main", writer), odd(&place, "ours.mcap")).unwrap();
     std::fs::rename(crate::replayed_others::bag_that_says(&place, "x"), odd(&place, "theirs.mcap")).unwrap();
     for words in [
         &["record", "info", "@ours.mcap"][..],
@@ -67,16 +63,14 @@ fn a_node_runs_by_its_configuration_and_tools_find_it() {
     let mut command = place.command(&["launch"]);
     command.arg(odd(&place, "robot.toml"));
     let mut launch = Running::start(command);
-    wait("the module is on", || {
+    until("the module is on", || {
         launch.assert_runs();
         let said = place.say(&["list"]);
-        (said.code == Some(0) && said.out.lines().any(|line| line.starts_with("probe.0 ") && line.contains(" on ")))
-            .then_some(())
+        said.code == Some(0) && said.out.lines().any(|line| line.starts_with("probe.0 ") && line.contains(" on "))
     });
     for words in [&["list", "--config", "@robot.toml"][..], &["restart", "probe.0"], &["graph", "-o", "@graph.svg"]] {
         let said = said(&place, words);
         assert_eq!(said.code, Some(0), "{words:?}: {said:?}");
     }
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

@@ -1,6 +1,6 @@
 //! At most once, from end to end: with any loss, duplicate or restart, no command runs twice.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, signal, until, wait};
 use crate::output::lines;
 use crate::probe::{COUNT, COUNT_AGAIN, ProbingInterface};
 use nix::sys::signal::Signal;
@@ -82,8 +82,7 @@ impl Raw {
 
 #[test]
 fn duplicates_of_one_envelope_run_once_and_have_the_same_answer() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let mut raw = Raw::new(&robot, "probe.0");
     for (function, number) in [(COUNT, 1), (COUNT_AGAIN, 2)] {
         for age_us in [0, 0, 1, 1000] {
@@ -100,8 +99,7 @@ fn duplicates_of_one_envelope_run_once_and_have_the_same_answer() {
 
 #[test]
 fn duplicates_of_an_order_to_launch_restart_a_module_once() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (_place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let mut raw = Raw::new(&robot, "tool.0");
     let pid = robot.pid("probe.0");
     let order = |age_us| CallEnvelope { interface: LauncherInterface::hash(), ..Raw::envelope(7, 1, age_us) };
@@ -123,8 +121,7 @@ fn duplicates_of_an_order_to_launch_restart_a_module_once() {
 
 #[test]
 fn a_restarted_caller_begins_anew_and_its_earlier_incarnation_is_not_heard() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let mut raw = Raw::new(&robot, "probe.0");
     for (incarnation, sequence, number) in [(7, 1, 1), (7, 2, 2), (8, 1, 3), (8, 2, 4)] {
         raw.send(COUNT, Raw::envelope(incarnation, sequence, 0), number);
@@ -139,7 +136,7 @@ fn a_restarted_caller_begins_anew_and_its_earlier_incarnation_is_not_heard() {
         assert_eq!(raw.answer(), refused);
     }
     // The server reports it, too, at a limited rate.
-    wait("the server's line", || {
+    until("the server's line", || {
         let log = lines(&place, "probe.0");
         let told = log.iter().filter(|line| {
             let text = line["text"].as_str().unwrap();
@@ -149,7 +146,7 @@ fn a_restarted_caller_begins_anew_and_its_earlier_incarnation_is_not_heard() {
         });
         let told = told.count();
         assert!(told <= 1, "{log:#?}");
-        (told == 1).then_some(())
+        told == 1
     });
     raw.send(COUNT, Raw::envelope(8, 3, 0), 7);
     assert_eq!(raw.answer().0, ReplyEnvelope { incarnation: 8, sequence: 3 });
@@ -164,15 +161,12 @@ fn a_restarted_caller_begins_anew_and_its_earlier_incarnation_is_not_heard() {
 
 #[test]
 fn a_restarted_server_runs_no_repeat_of_a_call_that_its_earlier_incarnation_may_have_run() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = { backoff = \"50 ms\" }")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "restart = { backoff = \"50 ms\" }")]);
     let mut raw = Raw::new(&robot, "probe.0");
     let began = Instant::now();
     raw.send(COUNT, Raw::envelope(7, 1, 0), 1);
     assert_eq!(raw.answer().1, Ok(1));
-    let pid = robot.pid("probe.0");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("probe.0", pid);
+    robot.kill("probe.0");
     let age_us = |began: Instant| began.elapsed().as_micros() as u32;
     for (function, sequence, answer) in
         [(COUNT, 1, Err(Fault::Interrupted)), (COUNT, 2, Err(Fault::Interrupted)), (COUNT_AGAIN, 3, Ok(1))]
@@ -190,8 +184,7 @@ fn a_restarted_server_runs_no_repeat_of_a_call_that_its_earlier_incarnation_may_
 
 #[test]
 fn repeats_that_pile_up_before_a_stopped_server_run_once() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let pid = robot.pid("probe.0");
     halt(pid);
     let call = std::thread::scope(|scope| {
@@ -206,13 +199,13 @@ fn repeats_that_pile_up_before_a_stopped_server_run_once() {
         });
         let early = call_early.join().unwrap();
         assert!(matches!(early, Err(CallError::Timeout(..))), "{early:?}");
-        wait("repeats", || (robot.waiting("probe.0") >= 2).then_some(()));
+        until("repeats", || robot.waiting("probe.0") >= 2);
         signal(pid, Signal::SIGCONT);
         call.join().unwrap()
     });
     // `call` asked for the description first, so its command came after.
     assert_eq!(call.ok(), "1\n");
-    wait("nothing waits", || (robot.waiting("probe.0") == 0).then_some(()));
+    until("nothing waits", || robot.waiting("probe.0") == 0);
     launch.stop();
     assert_eq!(place.counted(), [1], "what is answered for nobody any more is not run either");
 }
@@ -224,8 +217,7 @@ fn begin(robot: &Robot, link: &mut Link, number: u32, timeout: Duration) -> Resu
 
 #[test]
 fn replies_that_find_no_room_are_asked_for_again_and_nothing_runs_twice() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let participant = Participant::join(&robot.node, Name::NONE).unwrap();
     let me = Name::new(1, 16, 201, 0);
     // Room for one answer, and eight calls at a time.
@@ -237,7 +229,7 @@ fn replies_that_find_no_room_are_asked_for_again_and_nothing_runs_twice() {
         let timeout = Duration::from_secs(3);
         let calls: Vec<u32> = (0..8).map(|call| begin(&robot, &mut link, round * 8 + call, timeout).unwrap()).collect();
         // All have run, and seven answers found no room, before the first is taken.
-        wait("the round has run", || (place.counted().len() >= (round as usize + 1) * 8).then_some(()));
+        until("the round has run", || place.counted().len() >= (round as usize + 1) * 8);
         for call in calls {
             match link.wait(call, |bytes| rohrpost::wire::from_bytes::<u64>(bytes)) {
                 Ok(answer) => assert!(answers.insert(answer), "{answer} was told to two calls"),
@@ -263,9 +255,8 @@ fn replies_that_find_no_room_are_asked_for_again_and_nothing_runs_twice() {
 
 #[test]
 fn callers_in_a_crowd_before_a_small_mailbox_and_a_halting_server_never_run_twice() {
-    let place = Place::new();
     let keys = "[module.mailbox.commands]\nslots = 6\nfull = \"reject\"";
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", keys)]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", keys)]);
     let pid = robot.pid("probe.0");
     // Time enough for an answer when the server runs, too little when it is stopped: repeats, expiry and time-outs
     // happen.
@@ -301,7 +292,7 @@ fn callers_in_a_crowd_before_a_small_mailbox_and_a_halting_server_never_run_twic
         }
         threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
     });
-    wait("nothing waits", || (robot.waiting("probe.0") == 0).then_some(()));
+    until("nothing waits", || robot.waiting("probe.0") == 0);
     launch.stop();
     let counted = place.counted();
     let distinct: BTreeSet<u32> = counted.iter().copied().collect();
@@ -327,8 +318,7 @@ fn callers_in_a_crowd_before_a_small_mailbox_and_a_halting_server_never_run_twic
 /// As docs/src/wire.md says, of the common functions too.
 #[test]
 fn what_follows_the_arguments_is_refused_and_nothing_is_run() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (_place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let module = robot.name("probe.0");
     let write = |body: &mut Vec<u8>| {

@@ -10,8 +10,7 @@ fn calls_are_told_apart_where_their_numbers_wrap() {
         (65_530, "the id wraps alone"),
         (u32::MAX / 2 - 5, "the sequence becomes negative as a signed number"),
     ] {
-        let place = Place::new();
-        let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+        let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
         let mut tool = robot.tool(PATIENCE);
         tool.link.set_next_sequence(start);
         let mut told = Vec::new();
@@ -33,8 +32,7 @@ fn calls_are_told_apart_where_their_numbers_wrap() {
 
 #[test]
 fn calls_with_equal_ids_have_their_own_answers() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let mut calls = Vec::new();
     for number in 0..4u32 {

@@ -10,15 +10,13 @@ fn a_node_of_another_user_is_told_and_not_obeyed() {
     if !nix::unistd::geteuid().is_root() {
         return skipped("root alone can be somebody else; the other tests ran without its rights");
     }
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT]);
     // As in /dev/shm, where any user may have made it.
     fs::set_permissions(place.memory(), fs::Permissions::from_mode(0o1777)).unwrap();
     chown(robot.node.path(), Some(12_345), None).unwrap();
     let said = format!("node directory {} belongs to user 12345, not to us", robot.node.path().display());
     for arguments in [&["list"][..], &["stop", "output.0"]] {
-        let told = place.say(arguments).fails();
-        assert!(told.contains(&said), "{arguments:?}: {told}");
+        place.say(arguments).fails_with([&said]);
     }
     for arguments in ["doctor", "clean"] {
         let told = place.say(&[arguments]).out;
@@ -26,14 +24,12 @@ fn a_node_of_another_user_is_told_and_not_obeyed() {
     }
     chown(robot.node.path(), Some(0), None).unwrap();
     place.say(&["list"]).ok();
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn a_pipe_among_the_files_of_a_node_keeps_no_tool_waiting() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT]);
     let config = robot.node.path().join(rohrpost_launch::CONFIG_FILE);
     let put_pipe = |name: &str| {
         let path = robot.node.path().join(name);
@@ -44,10 +40,8 @@ fn a_pipe_among_the_files_of_a_node_keeps_no_tool_waiting() {
     place.say(&["list"]).ok();
     let noted = fs::read(&config).unwrap();
     put_pipe(rohrpost_launch::CONFIG_FILE);
-    let told = place.say(&["list"]).fails();
-    assert!(told.contains("it is a named pipe, not a file"), "{told}");
+    place.say(&["list"]).fails_with(["it is a named pipe, not a file"]);
     fs::remove_file(&config).unwrap();
     fs::write(&config, noted).unwrap();
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

@@ -1,7 +1,6 @@
 //! Output of modules arrives: through floods, panics, full disks and the collector's own death.
 
-use crate::harness::{OUTPUT, Place, probe, signal, wait};
-use crate::process::Running;
+use crate::harness::{OUTPUT, Place, json_lines, probe, signal, until, wait};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use std::fs;
@@ -9,7 +8,7 @@ use std::fs;
 /// The collector's lines of a module.
 pub(crate) fn lines(place: &Place, module: &str) -> Vec<Value> {
     let text = place.say(&["log", "--json", "--timeout", "60", "--module", module]).ok();
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    json_lines(&text)
 }
 
 /// Calls a function of a probe, however busy the computer is.
@@ -34,11 +33,10 @@ fn sum(lines: &[Value], key: &str) -> u64 {
 
 #[test]
 fn a_flood_of_one_module_hides_no_error() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", "")]);
-    let flood = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "flood", "info", "100000"]));
+    let (place, _launch, _robot) = Place::running(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", "")]);
+    let flood = place.start(&["call", "--timeout", "60", "probe.0", "flood", "info", "100000"]);
     call(&place, &["probe.1", "say", "error", "help"]);
-    wait("another's error", || texts(&lines(&place, "probe.1")).contains(&"help").then_some(()));
+    until("another's error", || texts(&lines(&place, "probe.1")).contains(&"help"));
     flood.said().ok();
     call(&place, &["probe.0", "say", "error", "my own"]);
     let said = |all: &[Value]| texts(all).iter().filter(|text| text.starts_with("flood ")).count() as u64;
@@ -62,9 +60,8 @@ fn a_flood_of_one_module_hides_no_error() {
 
 #[test]
 fn errors_have_an_allowance_of_their_own() {
-    let place = Place::new();
     let few = "[output]\nrate = 1\nburst = 3\n";
-    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", ""), few]);
+    let (place, _launch, _robot) = Place::running(&[OUTPUT, &probe("probe.0", "", ""), few]);
     for (level, lines) in [("info", "50"), ("error", "50")] {
         call(&place, &["probe.0", "flood", level, lines]);
     }
@@ -83,12 +80,12 @@ fn errors_have_an_allowance_of_their_own() {
 /// Without an effective limit, the collector's mailbox is the limit; refused lines are counted.
 #[test]
 fn a_collector_that_is_flooded_takes_errors_of_others() {
-    let place = Place::new();
     let many = "[output]\nrate = 1000000\nburst = 100000\nring = 100000\n";
-    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", ""), many]);
-    let flood = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "flood", "info", "20000"]));
+    let (place, _launch, _robot) =
+        Place::running(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", ""), many]);
+    let flood = place.start(&["call", "--timeout", "60", "probe.0", "flood", "info", "20000"]);
     call(&place, &["probe.1", "say", "error", "help"]);
-    wait("another's error", || texts(&lines(&place, "probe.1")).contains(&"help").then_some(()));
+    until("another's error", || texts(&lines(&place, "probe.1")).contains(&"help"));
     flood.said().ok();
     // The first may find the module's own queue full of the flood still.
     let mut tries = 0;
@@ -104,16 +101,15 @@ fn a_collector_that_is_flooded_takes_errors_of_others() {
 
 #[test]
 fn every_panic_arrives_with_its_place_and_message() {
-    let place = Place::new();
     let restart = "restart = { backoff = \"50 ms\", at-most = 9 }";
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", restart)]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", restart)]);
     for (how, ends, words) in [
         ("thread", false, &[("thread `wheels` panicked at ", ":\nthe wheels came off")][..]),
         ("here", true, &[("panicked at ", ":\ntwo lines\nof a panic")]),
         ("twice", true, &[("panicked at ", ":\nthe first of two"), ("panicked at ", ":\nthe second of two")]),
     ] {
         let pid = robot.pid("probe.0");
-        let panicking = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "panic", how]));
+        let panicking = place.start(&["call", "--timeout", "60", "probe.0", "panic", how]);
         for (begin, end) in words {
             let line = wait(format!("{how}: {begin} … {end}"), || {
                 let has = |line: &Value| {
@@ -136,17 +132,16 @@ fn every_panic_arrives_with_its_place_and_message() {
 
 #[test]
 fn a_killed_collector_loses_no_line_of_the_file() {
-    let place = Place::new();
     let output =
         "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\nrestart = { backoff = \"50 ms\", at-most = 9 }\n";
     let file = "[output]\nburst = 10000\nfile = \"robot.log\"\n";
-    let (_launch, robot) = place.launched(&[output, &probe("probe.0", "", ""), file]);
+    let (place, _launch, robot) = Place::running(&[output, &probe("probe.0", "", ""), file]);
     let read = || fs::read_to_string(place.path("robot.log")).unwrap();
     for round in 1..=3 {
         let (pid, before) = (robot.pid("output.0"), read().matches("flood ").count());
         // Fewer than may wait in its mailbox while it is away.
-        let flood = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "flood", "info", "300"]));
-        wait("the flood began", || (read().matches("flood ").count() > before).then_some(()));
+        let flood = place.start(&["call", "--timeout", "60", "probe.0", "flood", "info", "300"]);
+        until("the flood began", || read().matches("flood ").count() > before);
         signal(pid, Signal::SIGKILL);
         flood.said().ok();
         robot.wait_restarted("output.0", pid);
@@ -170,12 +165,11 @@ fn a_killed_collector_loses_no_line_of_the_file() {
 
 #[test]
 fn files_are_put_aside_and_programs_read_them() {
-    let place = Place::new();
     let file = "[output]\nburst = 10000\nfile = \"robot.log\"\nfile-size = \"8 KiB\"\nfiles = 2\nformat = \"json\"\n";
-    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", ""), file]);
+    let (place, _launch, _robot) = Place::running(&[OUTPUT, &probe("probe.0", "", ""), file]);
     call(&place, &["probe.0", "flood", "warn", "250"]);
     let read = |name: &str| fs::read_to_string(place.path(name)).unwrap_or_default();
-    wait("the last line", || read("robot.log").contains("\"flood 249\"").then_some(()));
+    until("the last line", || read("robot.log").contains("\"flood 249\""));
     let mut numbers = Vec::new();
     for name in ["robot.log.2", "robot.log.1", "robot.log"] {
         let text = read(name);
@@ -207,7 +201,7 @@ fn a_full_disk_costs_the_file_its_lines_and_nothing_else() {
     for text in ["one", "two"] {
         call(&place, &["probe.0", "say", "info", text]);
     }
-    wait("the ring goes on", || texts(&lines(&place, "probe.0")).contains(&"two").then_some(()));
+    until("the ring goes on", || texts(&lines(&place, "probe.0")).contains(&"two"));
     let told = lines(&place, "output.0");
     let told: Vec<&str> = texts(&told).into_iter().filter(|text| text.contains("robot.log")).collect();
     assert_eq!(told.len(), 1, "{told:?}");

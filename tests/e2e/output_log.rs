@@ -1,12 +1,8 @@
 //! `rohrpost log` as a person uses it: levels, filters, following.
 
-use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, halt, probe, signal, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, halt, probe, signal, until, wait};
 use crate::output::{call, is_own};
-use crate::process::Running;
 use nix::sys::signal::Signal;
-use std::fs::File;
-use std::io::Write;
-use std::os::unix::fs::OpenOptionsExt;
 
 const PATIENT: [&str; 3] = ["log", "--timeout", "60"];
 
@@ -24,26 +20,25 @@ fn shown(place: &Place, arguments: &[&str]) -> Vec<String> {
 /// Waits until so many probes' own last lines have come: later they would be among the last of all.
 fn wait_own(place: &Place, probes: usize) {
     let came = || log(place, &["--text", "running 1 test"]).ok().lines().count();
-    wait("what probes say of themselves", || (came() == probes).then_some(()));
+    until("what probes say of themselves", || came() == probes);
 }
 
 #[test]
 fn levels_are_set_while_modules_run() {
-    let place = Place::new();
     let levels = "[output]\nlevels = { \"probe.1\" = \"warn\" }\n";
     let restart = "restart = { backoff = \"50 ms\" }";
     let modules = [OUTPUT, &probe("probe.0", "", restart), &probe("probe.1", "", ""), levels];
-    let (_launch, robot) = place.launched(&modules);
+    let (place, _launch, robot) = Place::running(&modules);
     let say = |module: &str, level: &str, text: &str| call(&place, &[module, "say", level, text]);
 
     assert_eq!(log(&place, &["--level", "probe.0=debug"]).ok(), "probe.0: debug, was info\n");
     assert_eq!(log(&place, &["--level", "probe.0=debug"]).ok(), "probe.0: debug, as before\n");
     say("probe.0", "debug", "finer");
-    wait("a debug line", || shown(&place, &[]).contains(&"probe.0: finer".to_owned()).then_some(()));
+    until("a debug line", || shown(&place, &[]).contains(&"probe.0: finer".to_owned()));
     assert_eq!(log(&place, &["--level", "probe=error"]).ok(), "probe.0: error, was debug\nprobe.1: error, was warn\n");
     say("probe.0", "warn", "not sent");
     say("probe.0", "error", "sent");
-    wait("an error", || shown(&place, &[]).contains(&"probe.0: sent".to_owned()).then_some(()));
+    until("an error", || shown(&place, &[]).contains(&"probe.0: sent".to_owned()));
     assert!(!shown(&place, &[]).contains(&"probe.0: not sent".to_owned()));
 
     let two = ["--level", "probe.0=trace", "--level", "output.0=warn", "--json"];
@@ -59,17 +54,14 @@ fn levels_are_set_while_modules_run() {
     assert_eq!(rows[2], ["probe.1", "error", "warn", "0", "0"], "{table}");
 
     // It is the configuration's again in its next incarnation.
-    let pid = robot.pid("probe.0");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("probe.0", pid);
+    robot.kill("probe.0");
     let listed = log(&place, &["--levels", "--json"]).json();
     assert_eq!((&listed[1]["level"], &listed[1]["at_start"]), (&"info".into(), &"info".into()));
 }
 
 #[test]
 fn what_is_set_wrongly_is_told_with_what_would_be_right() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, _launch, _robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     for (arguments, words) in [
         (&["--level", "probe.0=loud"][..], "no level `loud`; there are error, warn, info, debug, trace"),
         (&["--level", "probe.7=debug"], "the configuration has no module `probe.7`; there are output.0, probe.0"),
@@ -88,9 +80,8 @@ fn what_is_set_wrongly_is_told_with_what_would_be_right() {
 
 #[test]
 fn filters_choose_by_module_class_level_text_and_time() {
-    let place = Place::new();
     let modules = [OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", ""), &probe("probe.2", "", "")];
-    let (_launch, _robot) = place.launched(&modules);
+    let (place, _launch, _robot) = Place::running(&modules);
     wait_own(&place, 3);
     for (module, level, text) in [
         ("probe.0", "info", "a Wall ahead"),
@@ -99,7 +90,7 @@ fn filters_choose_by_module_class_level_text_and_time() {
         ("probe.0", "info", "turned"),
     ] {
         call(&place, &[module, "say", level, text]);
-        wait(text, || shown(&place, &[]).iter().any(|line| line.ends_with(text)).then_some(()));
+        until(text, || shown(&place, &[]).iter().any(|line| line.ends_with(text)));
     }
     let (wall, hit, blocked, turned) =
         ("probe.0: a Wall ahead", "probe.1: hit the wall", "probe.2: wheels blocked", "probe.0: turned");
@@ -125,24 +116,21 @@ fn filters_choose_by_module_class_level_text_and_time() {
 
 #[test]
 fn a_follower_survives_the_collector_and_says_so() {
-    let place = Place::new();
     let output = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\nrestart = { backoff = \"50 ms\" }\n";
-    let (mut launch, robot) = place.launched(&[output, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[output, &probe("probe.0", "", "")]);
     wait_own(&place, 1);
     let say = |text: &str| call(&place, &["probe.0", "say", "info", text]);
     for number in 0..20 {
         say(&format!("earlier {number}"));
     }
     let is_last = |line: &String| line.ends_with("earlier 19");
-    wait("the collector has all", || shown(&place, &[]).last().is_some_and(is_last).then_some(()));
-    let mut follower = Running::start(place.command(&["log", "--follow", "--last", "1", "--timeout", "1"]));
+    until("the collector has all", || shown(&place, &[]).last().is_some_and(is_last));
+    let mut follower = place.start(&["log", "--follow", "--last", "1", "--timeout", "1"]);
     follower.wait_for("earlier 19");
     assert!(!follower.out().contains("earlier 18"), "{}", follower.out());
 
     // It has fewer lines than before when it comes back: its numbers begin anew.
-    let pid = robot.pid("output.0");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("output.0", pid);
+    robot.kill("output.0");
     say("after its death");
     follower.wait_for("main/probe.0: after its death\n");
     assert!(follower.out().contains("… output.0 was started again; the lines"), "{}", follower.out());
@@ -152,10 +140,10 @@ fn a_follower_survives_the_collector_and_says_so() {
     let (waited, answered) = (times("Waiting for it."), times("answers again"));
     let pid = robot.pid("output.0");
     halt(pid);
-    wait("it is told", || (times("Waiting for it.") > waited).then_some(()));
+    until("it is told", || times("Waiting for it.") > waited);
     say("while it hangs");
     signal(pid, Signal::SIGCONT);
-    wait("what was said meanwhile", || (times("main/probe.0: while it hangs\n") == 1).then_some(()));
+    until("what was said meanwhile", || times("main/probe.0: while it hangs\n") == 1);
     let told = (times("Waiting for it.") - waited, times("answers again") - answered);
     assert_eq!(told.0, told.1, "{}", follower.out());
     assert_eq!(times("after its death"), 1, "{}", follower.out());
@@ -168,36 +156,31 @@ fn a_follower_survives_the_collector_and_says_so() {
 
 #[test]
 fn a_follower_is_told_what_the_ring_no_longer_has() {
-    let place = Place::new();
     let small = "[output]\nring = 5\nburst = 1000\n";
-    let (_launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", ""), small]);
-    let mut follower = Running::start(place.command(&["log", "--follow", "--json", "--timeout", "60"]));
+    let (place, _launch, _robot) = Place::running(&[OUTPUT, &probe("probe.0", "", ""), small]);
+    let mut follower = place.start(&["log", "--follow", "--json", "--timeout", "60"]);
     follower.wait_for("is on");
     // It stands still while more is said than is kept.
     halt(follower.pid());
     call(&place, &["probe.0", "flood", "info", "50"]);
-    wait("the last one", || shown(&place, &[]).contains(&"probe.0: flood 49".to_owned()).then_some(()));
+    until("the last one", || shown(&place, &[]).contains(&"probe.0: flood 49".to_owned()));
     signal(follower.pid(), Signal::SIGCONT);
     follower.wait_for("flood 49");
-    wait("it is told", || follower.err().contains("lines are lost: output.0 keeps fewer").then_some(()));
+    until("it is told", || follower.err().contains("lines are lost: output.0 keeps fewer"));
     assert!(follower.out().lines().all(|line| line.starts_with('{')), "programs read lines alone");
-    drop(robot);
     follower.stop();
 }
 
 #[test]
 fn a_collector_that_does_not_answer_is_told_with_what_to_do() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, _launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     call(&place, &["output.0", "off"]);
-    let told = log(&place, &[]).fails();
-    assert!(told.contains("the collector output.0 is switched off: `rohrpost call output.0 on`"), "{told}");
+    log(&place, &[]).fails_with(["the collector output.0 is switched off: `rohrpost call output.0 on`"]);
     call(&place, &["output.0", "on"]);
     log(&place, &[]).ok();
     let pid = robot.pid("output.0");
     halt(pid);
-    let told = place.say(&["log", "--timeout", "0.2"]).fails();
-    assert!(told.contains("no answer from output.0 within 200ms") && told.contains("`rohrpost list`"), "{told}");
+    place.say(&["log", "--timeout", "0.2"]).fails_with(["no answer from output.0 within 200ms", "`rohrpost list`"]);
     signal(pid, Signal::SIGCONT);
 }
 
@@ -214,9 +197,8 @@ required = false
 settings = { map = "missing.map" }
 "#;
     let pilot = "[[module]]\nname = \"pilot.0\"\nprogram = \"./script\"\nrequired = false\n";
-    let script = File::options().write(true).create_new(true).mode(0o755).open(place.path("script"));
-    script.unwrap().write_all(b"#!/no/such/interpreter\n").unwrap();
-    let config = place.config(&[RECORDED_CLASSES, motor, OUTPUT, pilot]);
+    place.program("script", "#!/no/such/interpreter\n");
+    let config = place.config(&[&RECORDED_CLASSES, motor, OUTPUT, pilot]);
     let _launch = place.launch(&config);
     let told = |module: &str| {
         let said = place.say(&["log", "--timeout", "60", "--json", "--level", "error", "--module", module]);

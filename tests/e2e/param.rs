@@ -1,7 +1,7 @@
 //! `rohrpost param`, as a person uses it on a robot that runs.
 
 use crate::completions::offered;
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, assert_has, signal, until, wait};
 use crate::process::Running;
 use crate::tuned::{shown, tuned};
 use nix::sys::signal::Signal;
@@ -17,27 +17,24 @@ fn config(place: &Place, modules: &[&str]) -> PathBuf {
     file
 }
 
-fn launched(place: &Place, modules: &[&str]) -> (Running, Robot) {
-    let config = config(place, modules);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
-    (launch, robot)
+fn launched(modules: &[&str]) -> (Place, Running, Robot) {
+    let place = Place::new();
+    let (launch, robot) = place.launched_from(&config(&place, modules));
+    (place, launch, robot)
 }
 
 /// The module's own values, once they contain this.
 #[track_caller]
 fn wait_for(place: &Place, all: &str) {
-    wait(format!("probe.0 never had {all}"), || {
+    until(format!("probe.0 never had {all}"), || {
         let said = place.say(&["call", "probe.0", "get", "all"]);
-        said.out.contains(all).then_some(())
+        said.out.contains(all)
     });
 }
 
 #[test]
 fn parameters_are_listed_with_unit_range_and_text() {
-    let place = Place::new();
-    let (_launch, _robot) = launched(&place, &[OUTPUT, &tuned("probe.0", "mount = \"roof\"", "start = \"off\"")]);
+    let (place, _launch, _robot) = launched(&[OUTPUT, &tuned("probe.0", "mount = \"roof\"", "start = \"off\"")]);
     // Switched off: its parameters exist all the same.
     let table = place.say(&["param", "get", "probe.0"]).ok();
     let lines: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
@@ -62,8 +59,7 @@ fn parameters_are_listed_with_unit_range_and_text() {
 
 #[test]
 fn a_set_value_is_what_the_module_works_with_and_is_told() {
-    let place = Place::new();
-    let (_launch, _robot) = launched(&place, &[OUTPUT, &tuned("probe.0", "", "")]);
+    let (place, _launch, _robot) = launched(&[OUTPUT, &tuned("probe.0", "", "")]);
     for (parameter, value, says) in [
         ("gain", "-2.5", "probe.0 gain: 1 -> -2.5\n"),
         ("gain", "-2.5", "probe.0 gain: -2.5 as before\n"),
@@ -86,8 +82,7 @@ fn a_set_value_is_what_the_module_works_with_and_is_told() {
 
 #[test]
 fn a_refused_value_says_why_and_changes_nothing() {
-    let place = Place::new();
-    let (_launch, _robot) = launched(&place, &[OUTPUT, &tuned("probe.0", "", "")]);
+    let (place, _launch, _robot) = launched(&[OUTPUT, &tuned("probe.0", "", "")]);
     for (parameter, value, says) in [
         ("gain", "10.000001", "`gain` is 10.000001, out of range: -10..=10"),
         ("gain", "NaN", "`gain` is NaN, out of range: -10..=10"),
@@ -102,8 +97,7 @@ fn a_refused_value_says_why_and_changes_nothing() {
         ("gian", "1", "probe.0 has no parameter `gian`; did you mean `gain`? it has: gain, near-m, far-m"),
         ("mount", "roof", "probe.0 has no parameter `mount`; "),
     ] {
-        let told = place.say(&["param", "set", "probe.0", parameter, value]).fails();
-        assert!(told.contains(says), "{parameter} {value}\n  says: {told}\n  should say: {says}");
+        place.say(&["param", "set", "probe.0", parameter, value]).fails_with([says]);
     }
     wait_for(&place, " 1 1 9 Left true a \\\"word\\\" []");
     for (arguments, says) in [
@@ -112,8 +106,7 @@ fn a_refused_value_says_why_and_changes_nothing() {
         (&["param", "get", "prob.0"], "did you mean `probe`?"),
         (&["param", "set", "probe.0", "gain", "1", "--timeout=-1"], "-1 s is no time to wait"),
     ] {
-        let told = place.say(arguments).fails();
-        assert!(told.contains(says), "{arguments:?}: {told}");
+        place.say(arguments).fails_with([says]);
     }
     assert_eq!(place.say(&["param"]).code, Some(2));
     assert_eq!(place.say(&["param", "set", "probe.0", "gain"]).code, Some(2));
@@ -121,8 +114,7 @@ fn a_refused_value_says_why_and_changes_nothing() {
 
 #[test]
 fn shells_offer_modules_and_their_parameters() {
-    let place = Place::new();
-    let (_launch, _robot) = launched(&place, &[OUTPUT, &tuned("probe.0", "", "")]);
+    let (place, _launch, _robot) = launched(&[OUTPUT, &tuned("probe.0", "", "")]);
     for (words, offers) in [
         (&["rohrpost", "param", "get", "pro"][..], &["probe.0"][..]),
         (&["rohrpost", "param", "save", "o"], &["output.0"]),
@@ -130,14 +122,13 @@ fn shells_offer_modules_and_their_parameters() {
         (&["rohrpost", "param", "get", "output.0", ""], &[]),
     ] {
         // A module that is slow to answer is not waited for.
-        wait(format!("{words:?} offers {offers:?}"), || (offered(&place, words) == offers).then_some(()));
+        until(format!("{words:?} offers {offers:?}"), || offered(&place, words) == offers);
     }
 }
 
 #[test]
 fn a_module_that_hangs_is_given_up_in_time() {
-    let place = Place::new();
-    let (_launch, robot) = launched(&place, &[&tuned("probe.0", "", "")]);
+    let (place, _launch, robot) = launched(&[&tuned("probe.0", "", "")]);
     crate::harness::halt(robot.pid("probe.0"));
     let began = monotonic_ns();
     let said = place.say(&["param", "list", "--timeout", "0.3"]);
@@ -149,43 +140,36 @@ fn a_module_that_hangs_is_given_up_in_time() {
 
 #[test]
 fn saved_values_come_back_after_a_kill_and_at_the_next_start() {
-    let place = Place::new();
     let modules = [OUTPUT, &tuned("probe.0", "gain = 2.0", ""), &tuned("probe.1", "", "")];
-    let (mut launch, robot) = launched(&place, &modules);
+    let (place, mut launch, robot) = launched(&modules);
     place.say(&["param", "set", "probe.0", "gain", "3.5"]).ok();
     place.say(&["param", "set", "probe.0", "label", "two\nlines = \"x\""]).ok();
     place.say(&["param", "set", "probe.1", "side", "straight-ahead"]).ok();
-    let said = place.say(&["param", "save"]).ok();
-    assert!(said.contains("tuned.toml: probe.0 (6), probe.1 (6)"), "{said}");
+    place.say(&["param", "save"]).ok_with(["tuned.toml: probe.0 (6), probe.1 (6)"]);
     let text = std::fs::read_to_string(place.path("tuned.toml")).unwrap();
-    for words in ["[\"probe.0\"]\n# Factor of what is published. (-10..=10)\ngain = 3.5\n", "(0..=100 m)\nnear-m = 1\n"]
-    {
-        assert!(text.contains(words), "no `{words}` in:\n{text}");
-    }
+    assert_has(
+        &text,
+        ["[\"probe.0\"]\n# Factor of what is published. (-10..=10)\ngain = 3.5\n", "(0..=100 m)\nnear-m = 1\n"],
+    );
     // Unsaved values are lost with the process.
     place.say(&["param", "set", "probe.0", "far-m", "50"]).ok();
-    let old = robot.pid("probe.0");
-    signal(old, Signal::SIGKILL);
-    robot.wait_restarted("probe.0", old);
+    robot.kill("probe.0");
     wait_for(&place, " 3.5 1 9 Left true two\\nlines = \\\"x\\\" []");
     // One module alone: what is saved of the other stays.
     place.say(&["param", "set", "probe.0", "gain", "4"]).ok();
     place.say(&["param", "set", "probe.1", "side", "left"]).ok();
     place.say(&["param", "save", "probe.0"]).ok();
     launch.stop();
-    drop(robot);
-    let (_launch, _robot) = launched(&place, &modules);
+    let (_launch, _robot) = place.launched_from(&place.path("test.toml"));
     assert_eq!(shown(place.say(&["param", "get", "probe.0"]), "gain"), "4");
     assert_eq!(shown(place.say(&["param", "get", "probe.1"]), "side"), "straight-ahead");
-    let check = place.say(&["check", place.path("test.toml").to_str().unwrap()]).ok();
-    assert!(check.contains("gain = 4.0"), "{check}");
+    place.say(&["check", place.path("test.toml").to_str().unwrap()]).ok_with(["gain = 4.0"]);
 }
 
 #[test]
 fn a_file_is_loaded_whole_or_not_at_all_module_by_module() {
-    let place = Place::new();
-    let (_launch, _robot) = launched(&place, &[OUTPUT, &tuned("probe.0", "", ""), &tuned("probe.1", "", "")]);
-    let file = |text: &str| std::fs::write(place.path("other.toml"), text).unwrap();
+    let (place, _launch, _robot) = launched(&[OUTPUT, &tuned("probe.0", "", ""), &tuned("probe.1", "", "")]);
+    let file = |text: &str| place.write("other.toml", text);
     // Only together they are valid: each alone would be refused.
     file("[\"probe.0\"]\nnear-m = 20\nfar-m = 30\ngain = 2\n[\"probe.1\"]\ngain = 11\nside = \"straight-ahead\"\n");
     for dry in [true, false] {
@@ -219,26 +203,22 @@ fn a_file_is_loaded_whole_or_not_at_all_module_by_module() {
         ("gain = ", "other.toml:1: this is no TOML"),
     ] {
         file(text);
-        let told = place.say(&["param", "load", "other.toml"]).fails();
-        assert!(told.contains(says), "{text}\n  says: {told}\n  should say: {says}");
+        place.say(&["param", "load", "other.toml"]).fails_with([says]);
     }
     assert_eq!(shown(place.say(&["param", "get", "probe.1"]), "side"), "left");
-    let told = place.say(&["param", "load", "nowhere.toml"]).fails();
-    assert!(told.contains("nowhere.toml: "), "{told}");
+    place.say(&["param", "load", "nowhere.toml"]).fails_with(["nowhere.toml: "]);
 }
 
 #[test]
 fn a_file_that_is_something_else_is_not_written_over() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[OUTPUT, &tuned("probe.0", "", "")]);
-    let told = place.say(&["param", "save"]).fails();
-    assert!(told.contains("no file to save to; use `-o FILE`, or write `parameters = \"tuned.toml\"`"), "{told}");
+    let (place, _launch, _robot) = Place::running(&[OUTPUT, &tuned("probe.0", "", "")]);
+    let said = place.say(&["param", "save"]);
+    said.fails_with(["no file to save to; use `-o FILE`, or write `parameters = \"tuned.toml\"`"]);
     let before = std::fs::read_to_string(place.path("test.toml")).unwrap();
-    let told = place.say(&["param", "save", "-o", "test.toml"]).fails();
-    assert!(told.contains("test.toml is no file of parameters, and is left alone"), "{told}");
+    let said = place.say(&["param", "save", "-o", "test.toml"]);
+    said.fails_with(["test.toml is no file of parameters, and is left alone"]);
     assert_eq!(std::fs::read_to_string(place.path("test.toml")).unwrap(), before);
-    let told = place.say(&["param", "save", "-o", "no/such/folder.toml"]).fails();
-    assert!(told.contains("cannot be written"), "{told}");
+    place.say(&["param", "save", "-o", "no/such/folder.toml"]).fails_with(["cannot be written"]);
     let told = place.say(&["param", "save", "output.0", "-o", "own.toml"]).fails();
     assert!(told.contains("output.0 has no parameters") && !place.path("own.toml").exists(), "{told}");
     place.say(&["param", "save", "-o", "own.toml"]).ok();
@@ -250,11 +230,11 @@ fn a_bad_file_is_told_before_anything_runs_or_by_the_module() {
     let place = Place::new();
     let file = config(&place, &[&tuned("probe.0", "", "restart = \"never\"")]);
     let file = file.to_str().unwrap();
-    let tuned_file = |text: &str| std::fs::write(place.path("tuned.toml"), text).unwrap();
+    let tuned_file = |text: &str| place.write("tuned.toml", text);
     tuned_file("[\"probe.1\"]\n");
     for command in ["check", "launch"] {
-        let told = place.say(&[command, file]).fails();
-        assert!(told.contains("tuned.toml:1: `probe.1` names no module; did you mean [\"probe.0\"]?"), "{told}");
+        let said = place.say(&[command, file]);
+        said.fails_with(["tuned.toml:1: `probe.1` names no module; did you mean [\"probe.0\"]?"]);
     }
     for (text, says) in [
         (
@@ -270,7 +250,7 @@ fn a_bad_file_is_told_before_anything_runs_or_by_the_module() {
         tuned_file(text);
         // Only the user's own program knows its settings.
         place.say(&["check", file]).ok();
-        let mut launch = Running::start(place.command(&["launch", file]));
+        let mut launch = place.start(&["launch", file]);
         launch.end();
         let said = launch.out() + &launch.err();
         assert!(said.contains(says), "{text}\n  says: {said}\n  should say: {says}");
@@ -280,10 +260,9 @@ fn a_bad_file_is_told_before_anything_runs_or_by_the_module() {
 #[test]
 fn saved_values_of_built_in_modules_are_checked_before_anything_runs() {
     let place = Place::new();
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../config");
-    std::fs::copy(format!("{folder}/building.map"), place.path("building.map")).unwrap();
-    let demo = std::fs::read_to_string(format!("{folder}/demo.toml")).unwrap();
-    std::fs::write(place.path("demo.toml"), format!("parameters = \"tuned.toml\"\n{demo}")).unwrap();
+    place.copy("config/building.map");
+    let demo = include_str!("../../config/demo.toml");
+    place.write("demo.toml", format!("parameters = \"tuned.toml\"\n{demo}"));
     for (text, says) in [
         (
             "[\"pilot.0\"]\ncruise-m-s = 7\n",
@@ -296,10 +275,9 @@ fn saved_values_of_built_in_modules_are_checked_before_anything_runs() {
         ("[\"motor.0\"]\nseed = 7\n", "tuned.toml:2: [\"motor.0\"]: `seed` is no parameter; there are laser-rate-hz, "),
         ("[\"mapper.0\"]\nlaser = 7\n", "tuned.toml:2: [\"mapper.0\"]: `laser` is no parameter; the module has none"),
     ] {
-        std::fs::write(place.path("tuned.toml"), text).unwrap();
+        place.write("tuned.toml", text);
         for command in [&["check", "demo.toml"][..], &["launch", "demo.toml"]] {
-            let told = place.say(command).fails();
-            assert!(told.contains(says), "{command:?}\n  says: {told}\n  should say: {says}");
+            place.say(command).fails_with([says]);
         }
     }
     place.assert_empty();
@@ -307,8 +285,7 @@ fn saved_values_of_built_in_modules_are_checked_before_anything_runs() {
 
 #[test]
 fn no_bytes_bring_a_module_down() {
-    let place = Place::new();
-    let (_launch, robot) = launched(&place, &[&tuned("probe.0", "", "")]);
+    let (_place, _launch, robot) = launched(&[&tuned("probe.0", "", "")]);
     let (module, pid) = (robot.name("probe.0"), robot.pid("probe.0"));
     let mut tool = robot.tool(PATIENCE);
     let mut random = 0x9E37_79B9_7F4A_7C15u64;
@@ -346,7 +323,7 @@ fn no_bytes_bring_a_module_down() {
 #[test]
 fn the_pilot_drives_as_fast_as_it_was_set_to() {
     let place = Place::new();
-    let _demo = Running::start(place.command(&["demo", "--no-gui", "--quiet"]));
+    let _demo = place.start(&["demo", "--no-gui", "--quiet"]);
     let speed = || {
         let said = place.say(&["call", "motor.0", "get", "motion", "--json"]);
         let json: serde_json::Value = serde_json::from_str(&said.out).ok()?;
@@ -361,7 +338,7 @@ fn the_pilot_drives_as_fast_as_it_was_set_to() {
         assert!(speed <= 0.1 + 1e-9, "{speed} m/s");
         drove |= speed > 0.05;
     }
-    wait("it goes on driving", || (drove || speed().is_some_and(|speed| speed > 0.05)).then_some(()));
+    until("it goes on driving", || drove || speed().is_some_and(|speed| speed > 0.05));
     let told = place.say(&["param", "set", "pilot.0", "cruise-m-s", "7"]).fails();
     assert_eq!(told, "`cruise-m-s` is 7 m/s, out of range: 0..=1.5 m/s\n");
 }

@@ -2,22 +2,18 @@
 //! language.
 
 use crate::c_modules::compiled;
-use crate::harness::{OUTPUT, Place, Robot, program};
+use crate::harness::{OUTPUT, Place, program, run_if_launched};
 use crate::process::Running;
 use crate::python_node::package;
 use rohrpost::parameter::ParameterSet;
 use rohrpost::{Context, Module, ModuleError};
 use serde_json::{Value, json};
-use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Edges>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS) * 78);
-    }
+    run_if_launched::<Edges>();
 }
 
 /// Words that differ in little.
@@ -215,17 +211,14 @@ struct Scene {
 }
 
 impl Scene {
-    fn launched(&self) -> (Running, Robot) {
+    fn launched(&self) -> Running {
         let module = |name: &str| format!("[[module]]\nname = \"{name}\"\nprogram = {}\n", self.program);
         let config = self.place.config(&[OUTPUT, &module("probe.0"), &module("probe.1")]);
         let text = std::fs::read_to_string(&config).unwrap();
         std::fs::write(&config, format!("parameters = \"tuned.toml\"\n{text}")).unwrap();
         let mut command = self.place.command(&["launch", config.to_str().unwrap()]);
         command.env("PYTHONPATH", &self.path).env("PYTHONDONTWRITEBYTECODE", "1");
-        let mut launch = Running::start(command);
-        let robot = self.place.robot(&config, "main", &mut launch);
-        robot.wait_on(&mut launch);
-        (launch, robot)
+        self.place.up(command, &config, "main").0
     }
 
     fn values(&self) -> Vec<(String, Value)> {
@@ -236,13 +229,13 @@ impl Scene {
 
     /// Each edge is set by a file, saved, and there after the next start.
     fn survives(&self) {
-        let (mut launch, mut robot) = self.launched();
+        let mut launch = self.launched();
         let edges = edges();
         let rows = edges.iter().map(|(_, values)| values.len()).max().unwrap();
         for row in 0..rows {
             let row: Vec<(&str, Value)> =
                 edges.iter().map(|(name, values)| (*name, values[row % values.len()].clone())).collect();
-            std::fs::write(self.place.path("edges.toml"), file_of(&row)).unwrap();
+            self.place.write("edges.toml", file_of(&row));
             self.place.say(&["param", "load", "edges.toml"]).ok();
             let set = self.values();
             for ((name, value), (known, wanted)) in set.iter().zip(&row) {
@@ -253,14 +246,12 @@ impl Scene {
             self.place.say(&["param", "save", "probe.0"]).ok();
             // One of another module alone: what is there of the first stays.
             self.place.say(&["param", "save", "probe.1"]).ok();
-            drop(robot);
             launch.stop();
-            (launch, robot) = self.launched();
+            launch = self.launched();
             let file = std::fs::read_to_string(self.place.path("tuned.toml")).unwrap();
             assert_eq!(self.values(), set, "after the next start with\n{file}");
             self.place.say(&["check", self.place.path("test.toml").to_str().unwrap()]).ok();
         }
-        drop(robot);
         launch.stop();
     }
 }
@@ -274,16 +265,14 @@ fn what_a_parameter_in_rust_holds_survives_save_and_start() {
 #[test]
 fn what_a_parameter_in_python_holds_survives_save_and_start() {
     let place = Place::new();
-    let (program, path) = (place.path("edges.py"), package(&place));
-    std::fs::write(&program, PYTHON).unwrap();
-    std::fs::set_permissions(&program, PermissionsExt::from_mode(0o755)).unwrap();
+    let (program, path) = (place.program("edges.py", PYTHON), package(&place));
     Scene { place, program: format!("{program:?}"), path }.survives();
 }
 
 #[test]
 fn what_a_parameter_in_c_holds_survives_save_and_start() {
     let place = Place::new();
-    std::fs::write(place.path("edges.c"), C).unwrap();
+    place.write("edges.c", C);
     let program = format!("{:?}", compiled(&place, &place.path("edges.c")));
     Scene { place, program, path: PathBuf::new() }.survives();
 }
@@ -292,16 +281,14 @@ fn what_a_parameter_in_c_holds_survives_save_and_start() {
 fn a_value_that_the_next_start_would_refuse_is_not_saved_and_told() {
     let (place, path) = (Place::new(), PathBuf::new());
     let scene = Scene { place, program: program("param_edges::module"), path };
-    let (mut launch, robot) = scene.launched();
+    let mut launch = scene.launched();
     scene.place.say(&["call", "probe.0", "break_a_f64"]).ok();
     let said = scene.place.say(&["param", "save", "probe.0"]);
     let told = "probe.0: not saved, since its next start would refuse it: `a-f64` is NaN, out of range: f64\n";
     assert_eq!((said.code, said.err.as_str()), (Some(1), told), "{said:?}");
     assert!(said.out.ends_with("tuned.toml: probe.0 (12)\n"), "{said:?}");
-    drop(robot);
     launch.stop();
-    let (mut launch, robot) = scene.launched();
+    let mut launch = scene.launched();
     assert!(scene.values().contains(&("a-f64".into(), json!(1.0))), "its default");
-    drop(robot);
     launch.stop();
 }

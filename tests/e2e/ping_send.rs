@@ -1,20 +1,17 @@
 //! `ping` and `send`: commands over and over, and what came of each.
 
-use crate::harness::{PATIENCE, Place, halt, probe, signal, wait};
-use crate::process::Running;
+use crate::harness::{PATIENCE, Place, halt, json_lines, probe, signal, until};
 use nix::sys::signal::Signal;
-use serde_json::Value;
 
 #[test]
 fn ping_counts_answers_and_ends_at_its_deadline() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, _launch, robot) = Place::running(&[&probe("probe.0", "", "")]);
     let text = place.say(&["ping", "probe.0", "-c", "5", "--interval", "0"]).ok();
     assert!(text.contains("probe.0: answer 5 after "), "{text}");
     assert!(text.contains("probe.0: 5 sent, 5 answered, 0 lost\nround min "), "{text}");
     assert!(text.contains(" (there ") && text.contains("\nthere min ") && text.contains("\nback  min "), "{text}");
     let said = place.say(&["ping", "probe.0", "-c", "3", "--interval", "0", "--json"]).ok();
-    let said: Vec<Value> = said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let said = json_lines(&said);
     assert_eq!((said.len(), &said[3]["answered"], &said[3]["lost"]), (4, &3.into(), &0.into()));
     let figures = ["min_s", "p50_s", "p99_s", "max_s"].map(|figure| said[3][figure].as_f64().unwrap());
     assert!(figures.is_sorted() && figures[0] > 0.0, "{figures:?}");
@@ -36,14 +33,13 @@ fn ping_counts_answers_and_ends_at_its_deadline() {
     assert!(error.starts_with(&why) && error.contains(&format!("kill -CONT {pid} goes on")), "{error}");
     signal(pid, Signal::SIGCONT);
     place.say(&["ping", "probe.0", "-c", "1"]).ok();
-    let error = place.say(&["ping", "probe.3", "-c", "1"]).fails();
-    assert!(error.contains("the configuration has no module `probe.3`; there are probe.0"), "{error}");
+    let said = place.say(&["ping", "probe.3", "-c", "1"]);
+    said.fails_with(["the configuration has no module `probe.3`; there are probe.0"]);
 }
 
 #[test]
 fn send_repeats_a_command_and_counts_what_came_of_it() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (place, _launch, _robot) = Place::running(&[&probe("probe.0", "", "")]);
     let counts = place.say(&["send", "probe.0", "count", "7", "--rate", "10", "--count", "12", "--json"]).json();
     assert_eq!((&counts["sent"], &counts["answered"], &counts["timeouts"]), (&12.into(), &12.into(), &0.into()));
     assert_eq!(place.counted(), [7; 12]);
@@ -58,8 +54,8 @@ fn send_repeats_a_command_and_counts_what_came_of_it() {
     assert_eq!(said.code, Some(1), "{said:#?}");
     assert_eq!(said.err, "probe.0: the module is off; switch it on first\n");
     place.say(&["call", "probe.0", "on"]).ok();
-    let mut send = Running::start(place.command(&["send", "probe.0", "count", "9", "--rate", "200"]));
-    wait("it goes on until it is stopped", || (place.counted().iter().filter(|n| **n == 9).count() > 50).then_some(()));
+    let mut send = place.start(&["send", "probe.0", "count", "9", "--rate", "200"]);
+    until("it goes on until it is stopped", || place.counted().iter().filter(|n| **n == 9).count() > 50);
     // A probe that stands still for 40 ms has eight calls under way, and is sent no further one.
     send.signal(Signal::SIGINT);
     send.end();

@@ -1,10 +1,9 @@
 //! Printed text of modules becomes output, unless it already is.
 
-use crate::harness::{OUTPUT, Place, probe, signal, wait};
+use crate::harness::{OUTPUT, Place, probe, until, wait};
 use crate::output::{call, lines};
 use crate::probe::FILE;
 use crate::process::Running;
-use nix::sys::signal::Signal;
 use serde_json::Value;
 
 fn texts(lines: &[Value], level: &str) -> Vec<String> {
@@ -14,8 +13,7 @@ fn texts(lines: &[Value], level: &str) -> Vec<String> {
 
 #[test]
 fn what_a_module_prints_is_a_line_of_its_own() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, _launch, _robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     call(&place, &["probe.0", "print", "stdout", "a remark", "1"]);
     call(&place, &["probe.0", "print", "stderr", "a complaint", "1"]);
     // Also printed by its own output layer, for launch to repeat; it must not come twice.
@@ -33,11 +31,10 @@ fn what_a_module_prints_is_a_line_of_its_own() {
 
 #[test]
 fn last_words_are_errors_and_above_them_stands_how_it_ended() {
-    let place = Place::new();
     let restart = "restart = { backoff = \"50 ms\" }";
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", restart)]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", restart)]);
     let pid = robot.pid("probe.0");
-    let dying = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "last_words", "no more oil"]));
+    let dying = place.start(&["call", "--timeout", "60", "probe.0", "last_words", "no more oil"]);
     robot.wait_restarted("probe.0", pid);
     drop(dying);
     let all = wait("how it ended", || {
@@ -57,11 +54,9 @@ fn a_panic_comes_once_and_its_back_trace_with_it() {
     let config = place.config(&[OUTPUT, &probe("probe.0", "", "restart = { backoff = \"50 ms\" }")]);
     let mut command = place.command(&["launch", config.to_str().unwrap()]);
     command.env("RUST_BACKTRACE", "1");
-    let mut launch = Running::start(command);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (mut launch, robot) = place.up(command, &config, "main");
     let pid = robot.pid("probe.0");
-    let panicking = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "panic", "here"]));
+    let panicking = place.start(&["call", "--timeout", "60", "probe.0", "panic", "here"]);
     robot.wait_restarted("probe.0", pid);
     drop(panicking);
     let errors = wait("how it ended", || {
@@ -84,55 +79,49 @@ fn a_panic_comes_once_and_its_back_trace_with_it() {
 
 #[test]
 fn a_module_that_prints_without_end_floods_nobody() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[
+    let (place, _launch, robot) = Place::running(&[
         OUTPUT,
         &probe("probe.0", "", ""),
         &probe("probe.1", "", "restart = { backoff = \"50 ms\" }"),
     ]);
-    let flood =
-        Running::start(place.command(&["call", "--timeout", "60", "probe.0", "print", "stdout", "flood", "100000"]));
-    let pid = robot.pid("probe.1");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("probe.1", pid);
+    let flood = place.start(&["call", "--timeout", "60", "probe.0", "print", "stdout", "flood", "100000"]);
+    robot.kill("probe.1");
     call(&place, &["probe.1", "say", "error", "help"]);
-    wait("another's error", || texts(&lines(&place, "probe.1"), "error").contains(&"help".into()).then_some(()));
+    until("another's error", || texts(&lines(&place, "probe.1"), "error").contains(&"help".into()));
     flood.said().ok();
     // Not one is missing from the account.
     let sum = |all: &[Value], key: &str| all.iter().map(|line| line[key].as_u64().unwrap()).sum::<u64>();
-    wait("all are accounted for", || {
+    until("all are accounted for", || {
         let all = lines(&place, "probe.0");
         let printed = texts(&all, "info").iter().filter(|text| text.starts_with("flood ")).count() as u64;
         assert!(printed < 5_000, "{printed} of 100000 at 100 a second");
-        (printed + sum(&all, "suppressed") + sum(&all, "lost_before") == 100_000).then_some(())
+        printed + sum(&all, "suppressed") + sum(&all, "lost_before") == 100_000
     });
 }
 
 #[test]
 fn a_panic_while_there_is_no_collector_arrives_when_there_is_one() {
-    let place = Place::new();
     let restart = "restart = { backoff = \"50 ms\", at-most = 9 }";
-    let (_launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", restart)]);
+    let (place, _launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", restart)]);
     place.say(&["stop", "output.0", "--timeout", "60"]).ok();
     let pid = robot.pid("probe.0");
-    let panicking = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "panic", "here"]));
+    let panicking = place.start(&["call", "--timeout", "60", "probe.0", "panic", "here"]);
     robot.wait_restarted("probe.0", pid);
     drop(panicking);
     place.say(&["start", "output.0", "--timeout", "60"]).ok();
-    wait("the panic", || {
+    until("the panic", || {
         let all = lines(&place, "probe.0");
-        all.iter().any(|line| line["text"].as_str().unwrap().contains("of a panic")).then_some(())
+        all.iter().any(|line| line["text"].as_str().unwrap().contains("of a panic"))
     });
 }
 
 #[test]
 fn without_a_collector_launch_repeats_errors() {
-    let place = Place::new();
     let restart = "restart = { backoff = \"50 ms\", at-most = 9 }";
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", restart)]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", restart)]);
     call(&place, &["probe.0", "say", "error", "nobody collects this"]);
     let pid = robot.pid("probe.0");
-    let dying = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "last_words", "no more oil"]));
+    let dying = place.start(&["call", "--timeout", "60", "probe.0", "last_words", "no more oil"]);
     robot.wait_restarted("probe.0", pid);
     drop(dying);
     let out = launch.stop();
@@ -165,16 +154,13 @@ fn launch_shows_what_modules_say_if_it_is_asked_to() {
     for (log, is_shown) in [("--log", true), ("--log=warn", false)] {
         let place = Place::new();
         let config = place.config(&[OUTPUT, &probe("probe.0", "", "")]);
-        let mut launch = Running::start(place.command(&["launch", config.to_str().unwrap(), log]));
-        let robot = place.robot(&config, "main", &mut launch);
-        robot.wait_on(&mut launch);
+        let (mut launch, _robot) = place.up(place.command(&["launch", config.to_str().unwrap(), log]), &config, "main");
         call(&place, &["probe.0", "print", "stdout", "a remark", "1"]);
         call(&place, &["probe.0", "say", "error", "a complaint"]);
         let shown = wait("it is shown", || Some(launch.err()).filter(|err| err.contains("probe.0: a complaint\n")));
         assert_eq!(shown.contains(" info  main/probe.0: is on\n"), is_shown, "{log}: {shown}");
-        wait("what it printed", || (!is_shown || launch.err().contains("probe.0: a remark 0\n")).then_some(()));
-        launch.signal(Signal::SIGINT);
-        assert!(launch.end().success());
+        until("what it printed", || !is_shown || launch.err().contains("probe.0: a remark 0\n"));
+        launch.stop();
         assert_eq!(
             (launch.out().as_str(), launch.err().contains('\u{1b}')),
             ("node main of test runs: 2 modules\n", false)
@@ -187,7 +173,6 @@ fn what_is_to_be_shown_needs_a_collector_and_a_level() {
     let place = Place::new();
     let config = place.config(&[&probe("probe.0", "", "")]);
     for (log, told) in [("--log", "add a module with `builtin = \"output\"`"), ("--log=loud", "no level `loud`")] {
-        let said = place.say(&["launch", config.to_str().unwrap(), log]).fails();
-        assert!(said.contains(told), "{said}");
+        place.say(&["launch", config.to_str().unwrap(), log]).fails_with([told]);
     }
 }

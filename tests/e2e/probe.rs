@@ -3,11 +3,11 @@
 //! It is this test program itself, started by launch with the one test [`module`] to run: so it is built whenever the
 //! tests are, and no program for tests alone is ever installed.
 
+use crate::harness::run_if_launched;
 use nix::sys::signal::{SigHandler, Signal, raise, signal};
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError, Rate, Received, Subscription};
 use rohrpost_mailbox::{OverflowPolicy, Shape};
-use rohrpost_modules::runtime::{Start, run_started, tell_exit};
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -16,10 +16,7 @@ use std::time::Duration;
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let ended = Start::from_environment().and_then(run_started::<Probe>);
-        std::process::exit(tell_exit(ended).into());
-    }
+    run_if_launched::<Probe>();
 }
 
 /// This file as panics name it.

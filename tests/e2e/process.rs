@@ -1,6 +1,6 @@
 //! A process of a test, and its output.
 
-use crate::harness::PATIENCE;
+use crate::harness::{PATIENCE, assert_has};
 use nix::sys::resource::{Resource, setrlimit};
 use nix::sys::signal::{SigHandler, Signal, signal};
 use std::io::{BufRead, BufReader, Read};
@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 /// The output of a command.
 #[derive(Debug)]
 pub(crate) struct Said {
+    /// The command line.
+    asked: String,
     pub(crate) out: String,
     pub(crate) err: String,
     pub(crate) code: Option<i32>,
@@ -34,6 +36,22 @@ impl Said {
         self.err
     }
 
+    /// It ended well, and has printed these words.
+    #[track_caller]
+    pub(crate) fn ok_with<const N: usize>(self, words: [&str; N]) {
+        assert!(self.code == Some(0) && self.err.is_empty(), "{self:#?}");
+        println!("{}", self.asked);
+        assert_has(&self.out, words);
+    }
+
+    /// It failed, and told its user these words.
+    #[track_caller]
+    pub(crate) fn fails_with<const N: usize>(self, words: [&str; N]) {
+        assert!(self.code == Some(1) && !self.err.contains("panicked"), "{self:#?}");
+        println!("{}", self.asked);
+        assert_has(&self.err, words);
+    }
+
     #[track_caller]
     pub(crate) fn json(self) -> serde_json::Value {
         serde_json::from_str(&self.ok()).unwrap()
@@ -42,6 +60,8 @@ impl Said {
 
 /// A process with its output.
 pub(crate) struct Running {
+    /// The command line.
+    asked: String,
     child: Child,
     out: Printed,
     err: Printed,
@@ -101,10 +121,11 @@ pub(crate) fn without_real_time(command: &mut Command) {
 
 impl Running {
     pub(crate) fn start(mut command: Command) -> Self {
+        let asked = format!("{command:?}");
         heeding_signals(&mut command);
         let mut child = command.spawn().unwrap();
         let (out, err) = (Printed::read(child.stdout.take()), Printed::read(child.stderr.take()));
-        Self { child, out, err }
+        Self { asked, child, out, err }
     }
 
     pub(crate) fn pid(&self) -> u32 {
@@ -179,7 +200,21 @@ impl Running {
     #[track_caller]
     pub(crate) fn said(mut self) -> Said {
         let status = self.end();
-        Said { out: self.out(), err: self.err(), code: status.code() }
+        Said { asked: self.asked.clone(), out: self.out(), err: self.err(), code: status.code() }
+    }
+
+    /// Kills it, and waits for its end.
+    #[track_caller]
+    pub(crate) fn kill(&mut self) {
+        self.signal(Signal::SIGKILL);
+        self.end();
+    }
+
+    /// Stops it as Ctrl-C would: it ends with a failure, since something of it has failed.
+    #[track_caller]
+    pub(crate) fn stop_failed(&mut self) {
+        self.signal(Signal::SIGINT);
+        assert_eq!(self.end().code(), Some(1), "{}\n{}", self.out(), self.err());
     }
 
     /// Stops it as Ctrl-C would, and what it has printed.

@@ -1,28 +1,15 @@
 //! A module in Python that reads streams before they are written: it waits as one in Rust does, here and for another
 //! node. And what it prints and logs stands in one order.
 
-use crate::harness::{NETWORK, OUTPUT, Place, Robot, wait};
-use crate::lan::addresses;
+use crate::harness::{OUTPUT, Place, Robot, head, until, wait};
+use crate::network::{NETWORK, addresses, at, nodes};
 use crate::process::Running;
 use crate::python_node::package;
-use std::os::unix::fs::PermissionsExt;
 
 const EARLY: &str = include_str!("python/early.py");
 const COUNTING: &str = include_str!("python/counting.py");
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-laser = { id = 150 }
-camera = { id = 120 }
-gripper = { id = 110 }
-output = { id = 32 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
+const CLASSES: &str = "router 250, laser 150, camera 120, gripper 110, output 32, tool 16";
+const REPLICA: &str = r#"
 [[replica]]
 stream = "laser.0/scan"
 to = ["base"]
@@ -30,13 +17,10 @@ to = ["base"]
 
 /// The launch of node `base`, where a gripper waits for cameras without a program, and for a laser of a node that is
 /// off.
-fn launched(place: &Place, settings: &str) -> (Running, Robot) {
-    let config = place.path("robot.toml");
+fn launched(settings: &str) -> (Place, Running, Robot) {
+    let place = Place::new();
     let [base, brain] = addresses();
-    let nodes = format!(
-        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.brain]\naddress = \"{brain}\"\ntools = [16, 31]\n"
-    );
-    let on_base = |entry: &str| entry.replacen("[[module]]\n", "[[module]]\nnode = \"base\"\n", 1);
+    let nodes = nodes([("base", &base), ("brain", &brain)]);
     let camera = |number: u8| {
         format!(
             "[[module]]\nnode = \"base\"\nname = \"camera.{number}\"\nprogram = \"./counting.py\"\noptional = true\n\
@@ -48,26 +32,20 @@ fn launched(place: &Place, settings: &str) -> (Running, Robot) {
          calls = [\"camera.0\", \"camera.1\", \"laser.0\"]\nsettings = {{ {settings} }}\n"
     );
     let laser = "[[module]]\nnode = \"brain\"\nname = \"laser.0\"\nprogram = \"true\"\n";
-    let modules = [on_base(OUTPUT), gripper, camera(0), camera(1), laser.to_owned()].concat();
-    std::fs::write(&config, [HEAD, NETWORK, &nodes, &modules].concat()).unwrap();
-    write_program(place, "early.py", EARLY);
+    let modules = [at("base", OUTPUT), gripper, camera(0), camera(1), laser.to_owned()].concat();
+    let config = place.write("robot.toml", [&head(CLASSES), REPLICA, NETWORK, &nodes, &modules].concat());
+    place.program("early.py", EARLY);
     let mut command = place.command(&["launch", config.to_str().unwrap(), "--node", "base"]);
-    command.env("PYTHONPATH", package(place)).env("PYTHONDONTWRITEBYTECODE", "1");
+    command.env("PYTHONPATH", package(&place)).env("PYTHONDONTWRITEBYTECODE", "1");
     let mut launch = Running::start(command);
     let robot = place.robot(&config, "base", &mut launch);
-    (launch, robot)
-}
-
-fn write_program(place: &Place, name: &str, code: &str) {
-    std::fs::write(place.path(name), code).unwrap();
-    std::fs::set_permissions(place.path(name), PermissionsExt::from_mode(0o755)).unwrap();
+    launch.wait_for("runs: ");
+    (place, launch, robot)
 }
 
 #[test]
 fn a_reader_before_its_writer_waits_and_reads_from_the_first_record_on() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, "");
-    launch.wait_for("runs: ");
+    let (place, mut launch, robot) = launched("");
     assert_eq!(robot.state("gripper.0"), "on");
     let early = place.say(&["call", "gripper.0", "early", "--json"]).json();
     let (count, scan) = ("`count` of camera.0", "`scan` of laser.0");
@@ -86,47 +64,35 @@ fn a_reader_before_its_writer_waits_and_reads_from_the_first_record_on() {
     ];
     assert_eq!(early, serde_json::json!(told));
     // Their programs are there now.
-    write_program(&place, "counting.py", COUNTING);
+    place.program("counting.py", COUNTING);
     place.say(&["start", "camera.0"]).ok();
     assert_eq!(place.say(&["call", "gripper.0", "first", "--timeout", "60"]).ok(), "7\n");
     let last: u32 = place.say(&["call", "gripper.0", "last"]).ok().trim().parse().unwrap();
     assert!(last >= 7);
     assert_eq!(robot.state("gripper.0"), "on");
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn tools_say_one_thing_of_a_module_in_error_and_of_one_that_is_off() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, "fails = true");
-    launch.wait_for("runs: ");
-    wait("it is in error", || (robot.state("gripper.0") == "error").then_some(()));
+    let (place, mut launch, robot) = launched("fails = true");
+    until("it is in error", || robot.state("gripper.0") == "error");
     let why = "ValueError: no hand";
     for words in [&["list"][..], &["call", "gripper.0", "first"], &["start", "gripper.0"], &["status", "gripper.0"]] {
         let said = place.say(words);
         let told = format!("{}{}", said.out, said.err);
         assert!(told.contains("error") && told.contains(why), "{words:?}: {told}");
     }
-    let told = place.say(&["start", "gripper.0"]).fails();
-    assert!(
-        told.contains("gripper.0 runs, but is in error") && told.contains("`rohrpost restart gripper.0`"),
-        "{told}"
-    );
+    place.say(&["start", "gripper.0"]).fails_with(["gripper.0 runs, but is in error", "`rohrpost restart gripper.0`"]);
     place.say(&["call", "gripper.0", "off"]).ok();
-    let told = place.say(&["start", "gripper.0"]).fails();
-    assert!(told.contains("runs already, and is off; `rohrpost call gripper.0 on` switches it on"), "{told}");
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    let said = place.say(&["start", "gripper.0"]);
+    said.fails_with(["runs already, and is off; `rohrpost call gripper.0 on` switches it on"]);
+    place.end(&mut launch);
 }
 
 #[test]
 fn what_is_printed_and_what_is_logged_stand_in_one_order() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, "");
-    launch.wait_for("runs: ");
+    let (place, mut launch, _robot) = launched("");
     place.say(&["call", "gripper.0", "prints"]).ok();
     let said = wait("all of it is in the log", || {
         let log = place.say(&["log"]).out;
@@ -137,7 +103,5 @@ fn what_is_printed_and_what_is_logged_stand_in_one_order() {
     });
     let expected: Vec<String> = (0..20).flat_map(|n| [format!("printed {n}"), format!("logged {n}")]).collect();
     assert_eq!(said, expected);
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

@@ -1,11 +1,10 @@
 //! Modules in Python on the node: the gripper of the book beside a simulated robot, and what goes wrong in Python.
 
-use crate::harness::{Place, Robot, signal, wait};
+use crate::harness::{Place, Robot, assert_has, head, json_lines, python, repository, signal, until};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use std::os::unix::fs::{PermissionsExt, symlink};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::os::unix::fs::symlink;
+use std::path::PathBuf;
 
 const FAULTY: &str = include_str!("python/faulty.py");
 const MEDDLING: &str = include_str!("python/meddling.py");
@@ -13,21 +12,8 @@ const MEDDLING: &str = include_str!("python/meddling.py");
 const STREAMS: &str = "[module.stream.wide]\nrecord = \"64 KiB\"\n[module.stream.object]\nrecord = \"64 KiB\"\n";
 const OVER: &str = "of it: BufferError: the record of these bytes is in hand no more";
 const PAGE: &str = include_str!("../../docs/src/python-node.md");
+const CLASSES: &str = "motor 200, odometry 160, laser 150, camera 120, gripper 110, output 32, tool 16";
 const CONFIG: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 200 }
-odometry = { id = 160 }
-laser = { id = 150 }
-camera = { id = 120 }
-gripper = { id = 110 }
-output = { id = 32 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
 [nodes.main]
 [[module]]
 name = "output.0"
@@ -56,14 +42,10 @@ struct Scene {
     place: Place,
 }
 
-pub(crate) fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
-}
-
 /// The package with its part in Rust, which Cargo has put beside this program.
 pub(crate) fn package(place: &Place) -> PathBuf {
     let library = std::env::current_exe().unwrap().with_file_name("lib_node.so");
-    let (path, sources) = (place.path("package"), repository().join("clients/python/src/rohrpost"));
+    let (path, sources) = (place.path("package"), repository("clients/python/src/rohrpost"));
     std::fs::create_dir_all(path.join("rohrpost")).unwrap();
     for entry in std::fs::read_dir(sources).unwrap().map(|entry| entry.unwrap()) {
         symlink(entry.path(), path.join("rohrpost").join(entry.file_name())).unwrap();
@@ -75,7 +57,7 @@ pub(crate) fn package(place: &Place) -> PathBuf {
 /// With a section for each stream that this program has.
 fn configured(map: &str, settings: &str, code: &str) -> String {
     let streams = if code == FAULTY { STREAMS } else { "" };
-    CONFIG.replace("MAP", map).replace("SETTINGS", settings).replace("STREAMS", streams)
+    head(CLASSES) + &CONFIG.replace("MAP", map).replace("SETTINGS", settings).replace("STREAMS", streams)
 }
 
 /// The book's gripper.
@@ -88,11 +70,9 @@ impl Scene {
     fn launched(code: &str, settings: &str) -> Self {
         let place = Place::new();
         let package = package(&place);
-        let (config, program) = (place.path("robot.toml"), place.path("gripper.py"));
-        let map = format!("{:?}", repository().join("config/building.map"));
-        std::fs::write(&config, configured(&map, settings, code)).unwrap();
-        std::fs::write(&program, code).unwrap();
-        std::fs::set_permissions(&program, PermissionsExt::from_mode(0o755)).unwrap();
+        let map = format!("{:?}", repository("config/building.map"));
+        let config = place.write("robot.toml", configured(&map, settings, code));
+        place.program("gripper.py", code);
         let mut command = place.command(&["launch", config.to_str().unwrap()]);
         // Beside the sources nothing is to be written.
         command.env("PYTHONPATH", package).env("PYTHONDONTWRITEBYTECODE", "1");
@@ -126,8 +106,7 @@ impl Scene {
 #[test]
 fn the_gripper_of_the_book_is_a_module_like_any_other() {
     let scene = Scene::with_gripper();
-    let listed = scene.says(&["list", "--json"]).ok();
-    assert!(listed.contains("\"gripper.0\""), "{listed}");
+    scene.says(&["list", "--json"]).ok_with(["\"gripper.0\""]);
     assert!(scene.says(&["status", "gripper.0"]).ok().contains("\ngripper.0  on "));
     assert_eq!(scene.says(&["call", "gripper.0", "close", "4"]).ok(), "{width_m: 0.02, force_n: 4}\n");
     let refused = scene.says(&["call", "gripper.0", "close", "40"]);
@@ -136,10 +115,10 @@ fn the_gripper_of_the_book_is_a_module_like_any_other() {
         (Some(1), "gripper.0 answers with an error: \"more than 20 N break it\"")
     );
     let said = scene.says(&["call", "gripper.0"]).ok();
-    for words in ["Holds things, and stops the robot while it takes them.", "close <force_n: f64>", "How it holds now."]
-    {
-        assert!(said.contains(words), "{words}: {said}");
-    }
+    assert_has(
+        &said,
+        ["Holds things, and stops the robot while it takes them.", "close <force_n: f64>", "How it holds now."],
+    );
     let held = scene.says(&["echo", "gripper.0", "grip", "--count", "1"]).ok();
     assert!(held.ends_with("{width_m: 0.02, force_n: 4}\n"), "{held}");
     // Parameters: as configured, set, and refused.
@@ -150,7 +129,7 @@ fn the_gripper_of_the_book_is_a_module_like_any_other() {
     );
     assert!(scene.says(&["param", "set", "gripper.0", "speed-m-s", "0.3"]).fails().contains("out of range: 0..=0.2"));
     // It reads the camera's stream in place, and writes its own in place, which a tool in Rust reads.
-    wait("it has seen pictures", || (scene.written("edge") > 3).then_some(()));
+    until("it has seen pictures", || scene.written("edge") > 3);
     let edge = scene.says(&["stream", "read", "gripper.0", "edge"]).ok();
     assert!(edge.contains("height_px: 16") && edge.contains("Rgb8"), "{edge}");
     // Killed, it is started again, and its stream goes on.
@@ -158,7 +137,7 @@ fn the_gripper_of_the_book_is_a_module_like_any_other() {
     signal(pid, Signal::SIGKILL);
     scene.robot.wait_restarted("gripper.0", pid);
     assert_eq!(scene.says(&["call", "gripper.0", "close", "5"]).ok(), "{width_m: 0.02, force_n: 5}\n");
-    wait("it sees pictures again", || (scene.written("edge") > before).then_some(()));
+    until("it sees pictures again", || scene.written("edge") > before);
     for (order, state) in [("off", "off"), ("on", "on")] {
         scene.says(&["call", "gripper.0", order]).ok();
         assert_eq!(scene.robot.state("gripper.0"), state);
@@ -194,15 +173,14 @@ fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
         (&["wrong"], "the result of `wrong` cannot be written: 300 is out of range: u8 is 0 to 255".into()),
     ] {
         let told = told.replace("./", scene.place.path("").to_str().unwrap());
-        let failed = scene.says(&[&["call", "gripper.0"], words].concat()).fails();
-        assert!(failed.contains(&format!("the module is in error: {told}")), "{failed}: {told}");
+        scene.says(&[&["call", "gripper.0"], words].concat()).fails_with([&format!("the module is in error: {told}")]);
         let status = scene.says(&["status", "gripper.0"]).out;
         assert!(status.contains("error") && status.contains(&told), "{status}");
         again();
     }
     // Lines have the number of the kernel's error that they tell of.
     let lines = scene.says(&["log", "--module", "gripper.0", "--json"]).ok();
-    let lines: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines = json_lines(&lines);
     for (errno, words) in [(2, "FileNotFoundError: "), (28, "no room: [Errno 28] No space left on device")] {
         let told = lines.iter().find(|line| line["text"].as_str().unwrap().starts_with(words));
         assert_eq!(told.map(|line| &line["errno"]), Some(&errno.into()), "{lines:?}");
@@ -210,18 +188,17 @@ fn what_fails_in_python_puts_the_module_in_error_with_its_text_and_line() {
     // Those that run with a picture; a view that is kept.
     for (order, told) in [("fail", "RuntimeError: it is dark ("), ("keep", "Misuse: a view of record ")] {
         scene.says(&["call", "gripper.0", "order", order]).ok();
-        wait(format!("it is in error: {order}"), || (scene.robot.state("gripper.0") == "error").then_some(()));
+        until(format!("it is in error: {order}"), || scene.robot.state("gripper.0") == "error");
         let status = scene.says(&["status", "gripper.0"]).out;
         assert!(status.contains(told), "{status}");
         again();
     }
-    let set = scene.says(&["param", "set", "gripper.0", "gain", "7"]).fails();
-    assert!(set.contains("the module refuses: not seven"), "{set}");
+    scene.says(&["param", "set", "gripper.0", "gain", "7"]).fails_with(["the module refuses: not seven"]);
     assert_eq!(scene.says(&["param", "get", "gripper.0", "gain", "--json"]).json()[0]["value"], 2);
     assert_eq!(answers(&scene, "gains").trim(), "2", "the module has its old value again");
     // It still sees.
     let seen: u32 = answers(&scene, "sees").trim().parse().unwrap();
-    wait("it sees", || (answers(&scene, "sees").trim().parse::<u32>().unwrap() > seen).then_some(()));
+    until("it sees", || answers(&scene, "sees").trim().parse::<u32>().unwrap() > seen);
     scene.stop();
 }
 
@@ -234,48 +211,46 @@ fn threads_forks_and_the_end_are_told_by_exceptions() {
     let forked = answers(&scene, "forked");
     let (no_part, runs) = ("this process was forked from a module's", "a module runs in this process");
     assert!(forked.matches(no_part).count() == 2 && forked.matches(runs).count() == 2, "{forked}");
-    for words in ["locks: 0, its parent's: True", "goes on: True"] {
-        assert!(forked.contains(words), "{words}: {forked}");
-    }
+    assert_has(&forked, ["locks: 0, its parent's: True", "goes on: True"]);
     assert_eq!(answers(&scene, "strayed").trim(), "70", "a child that comes back is ended");
     let calls = answers(&scene, "calls");
-    for words in [
-        "stale: no exception, but None",
-        "has no function `fly`; it has: drive, halt",
-        "BadArguments: the arguments cannot be written: speed_m_s: expected a number (f64), got `fast`",
-        "FunctionError: NotFinite",
-        "Misconfigured: ",
-        "Misuse: Remembered.grip: value: expected a number (f64), got `wide`",
-        "Misuse: Remembered has no data `grab`; it has: grip",
-        "but it is opened for {x_m: f64, y_m: f64, heading_rad: f64}",
-        "is no stream; follow it as data",
-        "is not filled in place",
-    ] {
-        assert!(calls.contains(words), "{words}: {calls}");
-    }
+    assert_has(
+        &calls,
+        [
+            "stale: no exception, but None",
+            "has no function `fly`; it has: drive, halt",
+            "BadArguments: the arguments cannot be written: speed_m_s: expected a number (f64), got `fast`",
+            "FunctionError: NotFinite",
+            "Misconfigured: ",
+            "Misuse: Remembered.grip: value: expected a number (f64), got `wide`",
+            "Misuse: Remembered has no data `grab`; it has: grip",
+            "but it is opened for {x_m: f64, y_m: f64, heading_rad: f64}",
+            "is no stream; follow it as data",
+            "is not filled in place",
+        ],
+    );
     scene.says(&["call", "gripper.0", "hears", "tick"]).ok();
-    wait("it hears", || answers(&scene, "heard_word").contains("tick, Misuse: -1 is no open").then_some(()));
+    until("it hears", || answers(&scene, "heard_word").contains("tick, Misuse: -1 is no open"));
     let notes = answers(&scene, "notes");
-    for words in
-        ["Misuse: a record is being filled", "RuntimeError: no", "Misuse: a view of a record of `wide` that is", OVER]
-    {
-        assert!(notes.contains(words), "{words}: {notes}");
-    }
-    let noted = scene.says(&["stream", "read", "gripper.0", "note"]).ok();
-    assert!(noted.contains("{words: \"filled\", more: [97, 98, 99, 100]}"), "{noted}");
+    assert_has(
+        &notes,
+        ["Misuse: a record is being filled", "RuntimeError: no", "Misuse: a view of a record of `wide` that is", OVER],
+    );
+    scene.says(&["stream", "read", "gripper.0", "note"]).ok_with(["{words: \"filled\", more: [97, 98, 99, 100]}"]);
     assert_eq!((scene.written("note"), scene.written("wide"), scene.written("object")), (2, 0, 1));
     let looks = answers(&scene, "looks");
-    for words in [
-        "memoryview of ",
-        "leave its `with` before",
-        "ValueError: operation forbidden",
-        "the same: True",
-        "in between: Image, bytes of ",
-        "half way: True",
-        "was opened in another thread",
-    ] {
-        assert!(looks.contains(words), "{words}: {looks}");
-    }
+    assert_has(
+        &looks,
+        [
+            "memoryview of ",
+            "leave its `with` before",
+            "ValueError: operation forbidden",
+            "the same: True",
+            "in between: Image, bytes of ",
+            "half way: True",
+            "was opened in another thread",
+        ],
+    );
     // `around`, `at` and `interpolated` of the present epoch, of this one, and of the next one: however far the records
     // are apart, of those that are too far apart, and of those that are just not.
     let (free, apart) = ("there, there, other epoch", "gap, gap, other epoch");
@@ -290,26 +265,27 @@ fn a_view_that_outlives_its_record_is_told_and_leads_nowhere_else() {
     let mut scene = Scene::launched(FAULTY, "mood = \"good\"");
     scene.robot.wait_on(&mut scene.launch);
     let keeps = answers(&scene, "keeps");
-    for words in [
-        "slice: Misuse: a view of record ",
-        "still there: True",
-        "whole: Misuse: a view of record ",
-        "failed: ValueError: its own",
-        "object: no exception, but None",
-        OVER,
-        "circle: no exception, but None",
-        "write: TypeError: cannot modify read-only memory",
-        "twice: Misuse: a record of `image` of camera.0 is in hand; leave its `with` before another is read",
-        "again: Record(value=Image(width_px=",
-        "picky 0: BadReply: ",
-        "picky 1: BadReply: ",
-        "`odometry` of odometry.0: its class does not take it: ValueError: too far",
-        "laser: dict",
-        "meanwhile: {'Misuse: `image` of camera.0 was opened in another thread, that of its module, which alone may \
+    assert_has(
+        &keeps,
+        [
+            "slice: Misuse: a view of record ",
+            "still there: True",
+            "whole: Misuse: a view of record ",
+            "failed: ValueError: its own",
+            "object: no exception, but None",
+            OVER,
+            "circle: no exception, but None",
+            "write: TypeError: cannot modify read-only memory",
+            "twice: Misuse: a record of `image` of camera.0 is in hand; leave its `with` before another is read",
+            "again: Record(value=Image(width_px=",
+            "picky 0: BadReply: ",
+            "picky 1: BadReply: ",
+            "`odometry` of odometry.0: its class does not take it: ValueError: too far",
+            "laser: dict",
+            "meanwhile: {'Misuse: `image` of camera.0 was opened in another thread, that of its module, which alone may \
          read it'}",
-    ] {
-        assert!(keeps.contains(words), "{words}: {keeps}");
-    }
+        ],
+    );
     scene.stop();
 }
 
@@ -320,30 +296,32 @@ fn a_record_is_let_go_by_its_own_with_alone_and_by_that_for_sure() {
     let in_hand = "Misuse: a record of `odometry` of odometry.0 is in hand; leave its `with`";
     let not_in_hand = "Misuse: this `with` has no record of `odometry` of odometry.0 in hand";
     let meddles = answers(&scene, "meddles");
-    for words in [
-        &format!("exit: {not_in_hand}"),
-        &format!("enter: {in_hand}"),
-        "read: Meddling",
-        &format!("other: {not_in_hand}"),
-        &format!("still: {in_hand}"),
-        "thread: Misuse: `odometry` of odometry.0 was opened in another thread",
-        &format!("over: {not_in_hand}"),
-        "left: SystemExit: at once",
-        "equal: True, False",
-        "stale: Misuse: the record of `odometry` of odometry.0 that was found is gone",
-    ] {
-        assert!(meddles.contains(words), "{words}: {meddles}");
-    }
+    assert_has(
+        &meddles,
+        [
+            &format!("exit: {not_in_hand}"),
+            &format!("enter: {in_hand}"),
+            "read: Meddling",
+            &format!("other: {not_in_hand}"),
+            &format!("still: {in_hand}"),
+            "thread: Misuse: `odometry` of odometry.0 was opened in another thread",
+            &format!("over: {not_in_hand}"),
+            "left: SystemExit: at once",
+            "equal: True, False",
+            "stale: Misuse: the record of `odometry` of odometry.0 that was found is gone",
+        ],
+    );
     let keeps = answers(&scene, "keeps");
-    for words in [
-        "hoarded: Misuse: a view of record ",
-        "failed: ValueError: its own, collected 0 times",
-        "circle: Misuse: a view of record ",
-        "`numpy.array(…)`, collected 1 times",
-        "collected: no exception, but None",
-    ] {
-        assert!(keeps.contains(words), "{words}: {keeps}");
-    }
+    assert_has(
+        &keeps,
+        [
+            "hoarded: Misuse: a view of record ",
+            "failed: ValueError: its own, collected 0 times",
+            "circle: Misuse: a view of record ",
+            "`numpy.array(…)`, collected 1 times",
+            "collected: no exception, but None",
+        ],
+    );
     assert!(answers(&scene, "circles").contains("reader: None"), "{}", answers(&scene, "circles"));
     scene.stop();
 }
@@ -352,13 +330,11 @@ fn a_record_is_let_go_by_its_own_with_alone_and_by_that_for_sure() {
 fn by_hand_it_says_why_it_does_not_start_and_ends_by_control_c() {
     let place = Place::new();
     let (package, config) = (package(&place), place.path("robot.toml"));
-    std::fs::write(place.path("gripper.py"), FAULTY).unwrap();
+    place.write("gripper.py", FAULTY);
     let started = |settings: &str, arguments: &[&str]| {
         std::fs::write(&config, configured("\"no.map\"", settings, FAULTY)).unwrap();
-        let mut command = Command::new("python3");
-        command.arg("-B").arg("gripper.py").args(arguments).current_dir(place.path(""));
-        command.env("PYTHONPATH", &package).env("ROHRPOST_DIR", place.memory());
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut command = python(&place, &[&["gripper.py"], arguments].concat());
+        command.env("PYTHONPATH", &package);
         Running::start(command)
     };
     let named = ["--config", config.to_str().unwrap(), "--name", "gripper.0"];
@@ -373,9 +349,9 @@ fn by_hand_it_says_why_it_does_not_start_and_ends_by_control_c() {
         assert!(said.code == Some(code) && said.err.contains(told), "{told}: {said:?}");
     }
     let mut module = started("mood = \"good\"", &named);
-    wait("it is on", || {
+    until("it is on", || {
         module.assert_runs();
-        place.say_at(&config, "main", &["status", "gripper.0"]).out.contains("\ngripper.0  on ").then_some(())
+        place.say_at(&config, "main", &["status", "gripper.0"]).out.contains("\ngripper.0  on ")
     });
     module.signal(Signal::SIGINT);
     let said = module.said();

@@ -1,7 +1,7 @@
 //! The module that README shows is launched by the very lines that README shows.
 
 use crate::docs_printed::{Compared, difference, shown};
-use crate::harness::{Place, wait};
+use crate::harness::{Place, json_lines, until};
 use std::fs;
 use std::path::Path;
 
@@ -22,22 +22,19 @@ fn the_module_of_the_readme_is_launched_by_five_lines_and_known_to_all_tools() {
     // The example was built beside this test: target/debug/{deps/e2e-…, examples/compass}.
     let built = std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().join("examples/compass");
     let module = module.replace("../target/debug/examples/compass", built.to_str().unwrap());
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
-    let demo = fs::read_to_string(folder.join("demo.toml")).unwrap();
     // Whether the bridge was built, or not.
-    let demo = demo.replace("rohrpost-gui-bridge\"", "not-there\"");
+    let demo = include_str!("../../config/demo.toml").replace("rohrpost-gui-bridge\"", "not-there\"");
     let demo = demo.replacen("[nodes.main]", &format!("{class}\n\n[nodes.main]"), 1);
-    let config = place.path("demo.toml");
-    fs::write(&config, format!("{demo}\n{module}\n")).unwrap();
-    fs::copy(folder.join("building.map"), place.path("building.map")).unwrap();
+    let config = place.write("demo.toml", format!("{demo}\n{module}\n"));
+    place.copy("config/building.map");
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
-    wait("compass.0 is on", || (robot.state("compass.0") == "on").then_some(()));
+    until("compass.0 is on", || robot.state("compass.0") == "on");
     assert!(place.say(&["list"]).ok().contains("compass.0"));
     assert!(place.say(&["call", "compass.0"]).ok().contains("calibrate <bearing_deg: f64> -> f64"));
     assert_eq!(place.say(&["call", "compass.0", "calibrate", "90"]).ok(), "0\n");
     let echoed = place.say(&["echo", "compass.0", "--count", "2", "--json"]).ok();
-    let values: Vec<serde_json::Value> = echoed.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let values = json_lines(&echoed);
     assert_eq!(values.len(), 2);
     assert!(values.iter().all(|line| line["value"].as_f64().is_some_and(|bearing| (0.0..360.0).contains(&bearing))));
     let shown = shown("README.md");
@@ -51,6 +48,5 @@ fn the_module_of_the_readme_is_launched_by_five_lines_and_known_to_all_tools() {
         listed["modules"].as_array().unwrap().iter().find(|m| m["module"] == name).unwrap()["scheduling"].clone()
     };
     assert_eq!((nice("output.0"), nice("mapper.0")), ("nice 10".into(), "nice 0".into()));
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

@@ -1,21 +1,19 @@
 //! `rohrpost record`: files of a recording at the command line.
 
-use crate::harness::Place;
+use crate::harness::{Place, assert_has};
+use crate::recordings::{self, channel};
 use rohrpost::schema::{DataItem, DataKind, Description, Field, Members, Named, Schema, Type};
 use rohrpost::types::Pose;
-use rohrpost_recording::{ChannelSpec, LossCause, Message, Options, Session, Writer};
+use rohrpost_recording::{ChannelSpec, LossCause, Message, Session};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Ten seconds of two channels, 1700000000 s after 1970.
 fn recording(place: &Place, stem: &str) -> PathBuf {
     let session = Session { node: "base".into(), ..Session::default() };
-    let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), stem) }, session).unwrap();
+    let mut writer = recordings::begin(place, stem, session);
     let ty = Type::Struct(Named::new("Pace", Members::Fields(vec![Field::new("speed", Type::U8)])));
-    let mut channels = ["motor.0", "motor.1"].map(|name| {
-        let spec = ChannelSpec { name, item: "pace", ty: &ty, texts: BTreeMap::new() };
-        writer.channel(&spec).unwrap()
-    });
+    let mut channels = ["motor.0", "motor.1"].map(|name| channel(&mut writer, name, "pace", &ty));
     for number in 0..1_000_u32 {
         let arrival_ns = 1_700_000_000_000_000_000 + u64::from(number) * 10_000_000;
         let message = Message { arrival_ns, stamp_ns: arrival_ns, epoch: 1, sequence: number, data: &[number as u8] };
@@ -23,15 +21,14 @@ fn recording(place: &Place, stem: &str) -> PathBuf {
         channels.reverse();
     }
     writer.count_lost(channels[0], LossCause::Disk, 3);
-    writer.finish().1.unwrap();
-    place.path(&format!("{stem}-0001.mcap"))
+    recordings::end(place, stem, writer)
 }
 
 /// A recording in which each name and text is this one.
 pub(crate) fn recording_that_says(place: &Place, text: &str, ty: &Type) -> PathBuf {
     let texts = BTreeMap::from([(text.to_owned(), text.to_owned())]);
     let session = Session { node: text.into(), versions: texts.clone(), configuration: texts.clone() };
-    let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), "odd") }, session).unwrap();
+    let mut writer = recordings::begin(place, "odd", session);
     let field = Field::new(text, ty.clone());
     let data = vec![DataItem { number: 1, kind: DataKind::Data, field }];
     let description =
@@ -40,8 +37,7 @@ pub(crate) fn recording_that_says(place: &Place, text: &str, ty: &Type) -> PathB
     let channel = writer.channel(&ChannelSpec { name: text, item: text, ty, texts }).unwrap();
     let message = Message { arrival_ns: 1, stamp_ns: 1, epoch: 1, sequence: 0, data: text.as_bytes() };
     writer.write(channel, &message).unwrap();
-    writer.finish().1.unwrap();
-    place.path("odd-0001.mcap")
+    recordings::end(place, "odd", writer)
 }
 
 #[test]
@@ -50,15 +46,16 @@ fn a_recording_is_described_cut_merged_and_recovered() {
     let path = recording(&place, "base");
     let file = path.to_str().unwrap();
     let text = place.say(&["record", "info", file]).ok();
-    for words in [
-        ": 1000 messages, ",
-        "closed (ended)",
-        "3 messages are lost: 3 as the disk was slower than they came, or failed",
-        "from 1700000000.000000000 to 1700000009.990000000, 9.990 s",
-        "node base",
-    ] {
-        assert!(text.contains(words), "no `{words}` in:\n{text}");
-    }
+    assert_has(
+        &text,
+        [
+            ": 1000 messages, ",
+            "closed (ended)",
+            "3 messages are lost: 3 as the disk was slower than they came, or failed",
+            "from 1700000000.000000000 to 1700000009.990000000, 9.990 s",
+            "node base",
+        ],
+    );
     let row = text.lines().find(|line| line.starts_with("motor.0/pace ")).unwrap();
     assert_eq!(row.split_whitespace().collect::<Vec<_>>(), ["motor.0/pace", "500", "50.0", "3", "{speed:", "u8}"]);
     let told = place.say(&["record", "info", file, "--json"]).json();
@@ -91,12 +88,9 @@ fn a_recording_is_described_cut_merged_and_recovered() {
 /// Poses, ten a second for a second; the heading of the last one is no number.
 fn poses(place: &Place) -> PathBuf {
     let session = Session { node: "base".into(), ..Session::default() };
-    let options = Options { leave_bytes: 0, ..Options::new(place.path(""), "poses") };
-    let mut writer = Writer::start(options, session).unwrap();
-    let spec = ChannelSpec { name: "mapper.0", item: "pose", ty: &Pose::schema(), texts: BTreeMap::new() };
-    let pose = writer.channel(&spec).unwrap();
-    let speed = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
-    let speed = writer.channel(&speed).unwrap();
+    let mut writer = recordings::begin(place, "poses", session);
+    let pose = channel(&mut writer, "mapper.0", "pose", &Pose::schema());
+    let speed = channel(&mut writer, "motor.0", "speed", &Type::U8);
     for number in 0..10_u32 {
         let stamp_ns = 1_700_000_000_000_000_000 + u64::from(number) * 100_000_000;
         let heading_rad = if number == 9 { f64::NAN } else { 0.0 };
@@ -105,8 +99,7 @@ fn poses(place: &Place) -> PathBuf {
         writer.write(pose, &message).unwrap();
         writer.write(speed, &Message { data: &[7], ..message }).unwrap();
     }
-    writer.finish().1.unwrap();
-    place.path("poses-0001.mcap")
+    recordings::end(place, "poses", writer)
 }
 
 #[test]
@@ -143,17 +136,17 @@ fn a_recording_is_exported_for_others_to_draw() {
     let (file, to) = (file.to_str().unwrap(), place.path("drawn.mcap"));
     let to = to.to_str().unwrap();
     let text = place.say(&["record", "export", file, "-o", to, "--format", "drawn"]).ok();
-    for words in [
-        ": 19 messages, ",
-        "\nmapper.0/pose/pose: 9\nmapper.0/pose/transform: 9\nworld/transform: 1\n",
-        "are on mapper.0",
-        "mapper.0/pose: 1 not drawn: ",
-        "not drawn, as there is no picture of them: motor.0/speed",
-    ] {
-        assert!(text.contains(words), "no `{words}` in:\n{text}");
-    }
-    let text = place.say(&["record", "info", to]).ok();
-    assert!(text.contains("foxglove.FrameTransform protobuf, drawn of mapper.0/pose"), "{text}");
+    assert_has(
+        &text,
+        [
+            ": 19 messages, ",
+            "\nmapper.0/pose/pose: 9\nmapper.0/pose/transform: 9\nworld/transform: 1\n",
+            "are on mapper.0",
+            "mapper.0/pose: 1 not drawn: ",
+            "not drawn, as there is no picture of them: motor.0/speed",
+        ],
+    );
+    place.say(&["record", "info", to]).ok_with(["foxglove.FrameTransform protobuf, drawn of mapper.0/pose"]);
     let told = place.say(&["record", "info", to, "--json"]).json();
     assert_eq!(told["channels"][0]["drawn_of"], "mapper.0/pose");
     assert!(
@@ -193,8 +186,7 @@ fn mistakes_with_recordings_are_explained() {
         ),
         (&["record", "export", file, "-o", part, "--format", "json", "--with-original"], "is for --format drawn"),
     ] {
-        let told = place.say(arguments).fails();
-        assert!(told.contains(words), "{arguments:?}: {told}");
+        place.say(arguments).fails_with([words]);
     }
     let said = place.say(&["record", "cut", file, "-o", part, "--from", "noon"]);
     assert!(said.code == Some(2) && said.err.contains("before the end (-10s)"), "{said:?}");

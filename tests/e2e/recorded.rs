@@ -1,16 +1,18 @@
 //! The built-in module `logd` on a running node: all that was sent is in its files, or counted; they are whole, also
 //! after it was killed; and a disk that is not there is told, and disturbs nobody.
 
-use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, program, signal, wait};
+use crate::harness::{
+    NoSettings, OUTPUT, Place, RECORDED_CLASSES, Robot, assert_has, program, run_if_launched, signal, until, wait,
+};
 use crate::process::Running;
+use crate::recordings;
 use nix::sys::signal::Signal;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
-use rohrpost::serde::Deserialize;
 use rohrpost::wire::from_bytes;
 use rohrpost::{Context, Module, ModuleError, data};
 use rohrpost_mailbox::StreamId;
-use rohrpost_recording::{LossCause, Reader, info, is_closed};
+use rohrpost_recording::{LossCause, info, is_closed};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,10 +21,7 @@ use std::time::Duration;
 /// Not a test: a module that launch starts. Run as a test it ends at once.
 #[test]
 fn feeder() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Feeder>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Feeder>();
 }
 
 /// Larger than what data mailboxes take.
@@ -61,20 +60,16 @@ trait Feeding {
     fn frame() -> Frame;
 }
 
-#[derive(Deserialize, Default)]
-#[serde(crate = "rohrpost::serde", deny_unknown_fields, default)]
-struct FeederSettings {}
-
 struct Feeder {
     wanted: u64,
     sent: u64,
 }
 
 impl Module for Feeder {
-    type Settings = FeederSettings;
+    type Settings = NoSettings;
     type Interfaces = FeedingInterface;
 
-    fn new(_: FeederSettings, context: &mut Context) -> Result<Self, ModuleError> {
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         context.set_period(Duration::from_millis(1));
         Ok(Self { wanted: 0, sent: 0 })
     }
@@ -129,17 +124,16 @@ pub(crate) fn feeder_entry(number: u8) -> String {
     )
 }
 
-pub(crate) fn launched(place: &Place, record: &str) -> (Running, Robot) {
-    launched_with(place, LOGD, record)
+pub(crate) fn launched(record: &str) -> (Place, Running, Robot) {
+    let place = Place::new();
+    let (launch, robot) = launched_with(&place, LOGD, record);
+    (place, launch, robot)
 }
 
 /// The same, with another entry of the recorder.
 pub(crate) fn launched_with(place: &Place, logd: &str, record: &str) -> (Running, Robot) {
-    let config = place.config(&[RECORDED_CLASSES, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record]);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
-    (launch, robot)
+    let config = place.config(&[&RECORDED_CLASSES, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record]);
+    place.launched_from(&config)
 }
 
 fn call(place: &Place, module: &str, function: &[&str]) -> Value {
@@ -165,36 +159,34 @@ fn accounts(place: &Place) -> BTreeMap<String, (u64, u64)> {
 /// Feeds one by one until the recorder has something of each item: from then on nothing may be missing without being
 /// counted.
 pub(crate) fn feed_until_recorded(place: &Place, module: &str) {
-    wait(format!("{module} is recorded"), || {
+    until(format!("{module} is recorded"), || {
         feed(place, module, 1);
         let accounts = accounts(place);
         let has = |item: &str| accounts.get(&format!("{module}/{item}")).is_some_and(|(written, _)| *written > 0);
-        (has("count") && has("frame")).then_some(())
+        has("count") && has("frame")
     });
 }
 
 /// Messages of a topic in a file but those that it repeats, also in one that is being written.
 fn messages<T>(file: &Path, topic: &str, read: impl Fn(&[u8]) -> T) -> Vec<T> {
-    let mut messages = Vec::new();
-    let Ok(mut reader) = Reader::open(file) else { return messages };
-    while let Ok(Some((channel, message))) = reader.next() {
-        if channel.topic == topic && !channel.is_repeated() {
-            messages.push(read(message.data));
-        }
+    recordings::messages(file, |channel, message| {
+        (channel.topic == topic && !channel.is_repeated()).then(|| read(message.data))
+    })
+}
+
+/// The number in a value of a feeder's topic, of which the bytes are right.
+pub(crate) fn number(topic: &str, bytes: &[u8]) -> u64 {
+    if topic.ends_with("/count") {
+        return from_bytes(bytes).unwrap();
     }
-    messages
+    let frame: Frame = from_bytes(bytes).unwrap();
+    assert!(frame.bytes == noise(frame.number), "frame {} has other bytes than those that were sent", frame.number);
+    frame.number
 }
 
 /// Numbers of all values of a topic.
 pub(crate) fn numbers(file: &Path, topic: &str) -> Vec<u64> {
-    let numbers = messages(file, topic, |bytes| {
-        if topic.ends_with("/count") {
-            return from_bytes(bytes).unwrap();
-        }
-        let frame: Frame = from_bytes(bytes).unwrap();
-        assert!(frame.bytes == noise(frame.number), "frame {} has other bytes than those that were sent", frame.number);
-        frame.number
-    });
+    let numbers = messages(file, topic, |bytes| number(topic, bytes));
     assert!(numbers.is_sorted_by(|a, b| a < b), "{topic}: {numbers:?}");
     numbers
 }
@@ -230,8 +222,7 @@ fn what_is_named_is_recorded_and_each_value_is_in_the_file_or_counted() {
     /// Of the second feeder one in ten and one in seven are wanted, by the numbers of packages and records.
     const TOPICS: [(&str, u64); 4] =
         [("feeder.0/count", 1), ("feeder.0/frame", 1), ("feeder.1/count", 10), ("feeder.1/frame", 7)];
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, RECORD);
+    let (place, mut launch, _robot) = launched(RECORD);
     let file = place.path("recordings/main-0001.mcap");
     ["feeder.0", "feeder.1"].iter().for_each(|module| feed_until_recorded(&place, module));
     let last: Vec<u64> = ["feeder.0", "feeder.1"].iter().map(|module| feed(&place, module, 400)).collect();
@@ -242,8 +233,7 @@ fn what_is_named_is_recorded_and_each_value_is_in_the_file_or_counted() {
     let state = call(&place, "logd.0", &["recording"]);
     assert_eq!((&state["problem"], state["file"].is_string()), (&Value::Null, true), "{state:#}");
     place.say(&["call", "feeder.0", "off"]).ok();
-    wait("a line", || lines(&file).iter().any(|line| line == "is off").then_some(()));
-    drop(robot);
+    until("a line", || lines(&file).iter().any(|line| line == "is off"));
     launch.stop();
 
     let info = info(&file).unwrap();
@@ -254,19 +244,17 @@ fn what_is_named_is_recorded_and_each_value_is_in_the_file_or_counted() {
     assert_eq!(info.session["node"], "main");
     assert!(info.configuration["test.toml"].contains("[record]"), "{:?}", info.configuration);
     let said = place.say(&["record", "info", file.to_str().unwrap()]).ok();
-    for words in
-        ["feeder.0/frame", "{number: u64, bytes: ", "output.0/line", "drawn of output.0/line", "closed (ended)"]
-    {
-        assert!(said.contains(words), "no `{words}` in:\n{said}");
-    }
+    assert_has(
+        &said,
+        ["feeder.0/frame", "{number: u64, bytes: ", "output.0/line", "drawn of output.0/line", "closed (ended)"],
+    );
     let said = place.say(&["log", "--file", file.to_str().unwrap(), "--module", "feeder.0"]).ok();
     assert!(said.ends_with(" info  main/feeder.0: is off\n"), "{said}");
 }
 
 #[test]
 fn a_recorder_that_is_killed_goes_on_and_makes_a_whole_file_of_what_it_had() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, RECORD);
+    let (place, mut launch, robot) = launched(RECORD);
     let [torn, recovered, next] =
         ["main-0001", "main-0001.recovered", "main-0002"].map(|name| place.path(&format!("recordings/{name}.mcap")));
     feed_until_recorded(&place, "feeder.0");
@@ -274,14 +262,11 @@ fn a_recorder_that_is_killed_goes_on_and_makes_a_whole_file_of_what_it_had() {
     let topics = ["feeder.0/count", "feeder.0/frame"];
     topics.iter().for_each(|topic| wait_for_all(&place, &torn, topic, before, 1));
     let known = accounts(&place);
-    let pid = robot.pid("logd.0");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("logd.0", pid);
+    robot.kill("logd.0");
     feed_until_recorded(&place, "feeder.0");
     let last = feed(&place, "feeder.0", 200);
     topics.iter().for_each(|topic| wait_for_all(&place, &next, topic, last, 1));
-    wait("the first file is recovered", || recovered.exists().then_some(()));
-    drop(robot);
+    until("the first file is recovered", || recovered.exists());
     launch.stop();
 
     assert!(!is_closed(&torn).unwrap() && is_closed(&recovered).unwrap());
@@ -307,10 +292,10 @@ fn what_was_written_while_the_recorder_was_away_is_taken_from_the_ring_or_counte
     for (number, meanwhile, is_lost) in [(1, 100, false), (2, 700, true)] {
         let [file, next] = [number, number + 1].map(|at| place.path(&format!("recordings/main-{at:04}.mcap")));
         let before = feed(&place, "feeder.0", 50);
-        wait("all is written", || (numbers(&file, topic).last() == Some(&before)).then_some(()));
+        until("all is written", || numbers(&file, topic).last() == Some(&before));
         let pid = robot.pid("logd.0");
         signal(pid, Signal::SIGKILL);
-        wait("it is gone", || robot.process("logd.0").is_none().then_some(()));
+        until("it is gone", || robot.process("logd.0").is_none());
         let last = feed(&place, "feeder.0", meanwhile);
         place.say(&["start", "logd.0"]).ok();
         wait("what came meanwhile is written", || (numbers(&next, topic).last()? >= &last).then_some(()));
@@ -322,7 +307,6 @@ fn what_was_written_while_the_recorder_was_away_is_taken_from_the_ring_or_counte
         assert_eq!((began - before - 1, away > 0), (away, is_lost), "{channel}");
         assert_eq!(channel["lost"], away, "{channel}");
     }
-    drop(robot);
     launch.stop();
     assert!(all.is_sorted_by(|a, b| a < b), "nothing is recorded twice: {all:?}");
     let told = info(&place.path("recordings/main-0003.mcap")).unwrap();
@@ -331,8 +315,7 @@ fn what_was_written_while_the_recorder_was_away_is_taken_from_the_ring_or_counte
 
 #[test]
 fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, &RECORD.replace("\"recordings\"", "\"disk/recordings\""));
+    let (place, mut launch, robot) = launched(&RECORD.replace("\"recordings\"", "\"disk/recordings\""));
     let errors = || place.say(&["log", "--timeout", "60", "--level", "error"]).out;
     let told = wait("an error", || Some(errors()).filter(|lines| lines.contains("records nothing: ")));
     assert!(told.contains("/disk/recordings") && told.contains(": is gone; make the folder again"), "{told}");
@@ -344,9 +327,9 @@ fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
         (line["state"].as_str().unwrap().to_owned(), line["error"].as_str().unwrap_or_default().to_owned())
     };
     for tool in ["status", "list"] {
-        wait(format!("{tool} says that nothing is recorded"), || {
+        until(format!("{tool} says that nothing is recorded"), || {
             let (state, error) = shown(tool);
-            (state == "on" && error.starts_with("records nothing: ") && error.contains("is gone")).then_some(())
+            state == "on" && error.starts_with("records nothing: ") && error.contains("is gone")
         });
     }
     let frames = StreamId { name: robot.name("feeder.0"), number: FeedingInterface::FRAME.number };
@@ -364,11 +347,10 @@ fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
     for topic in ["feeder.0/count", "feeder.0/frame"] {
         wait_for_all(&place, &file, topic, 100, 1);
     }
-    wait("a line", || lines(&file).iter().any(|line| line.starts_with("records again; ")).then_some(()));
+    until("a line", || lines(&file).iter().any(|line| line.starts_with("records again; ")));
     for tool in ["status", "list"] {
-        wait(format!("{tool} says that all is well"), || (shown(tool) == ("on".into(), String::new())).then_some(()));
+        until(format!("{tool} says that all is well"), || shown(tool) == ("on".into(), String::new()));
     }
-    drop(robot);
     launch.stop();
     for topic in ["feeder.0/count", "feeder.0/frame"] {
         assert_eq!(numbers(&file, topic), (1..=100).collect::<Vec<u64>>(), "{topic}");
@@ -377,15 +359,12 @@ fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
 
 #[test]
 fn the_example_of_the_book_is_right() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let read = |file: &str| std::fs::read_to_string(root.join(file)).unwrap();
-    let page = read("docs/src/recording.md");
+    let page = include_str!("../../docs/src/recording.md");
     let example = page.split("```toml\n[classes]\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
     let (class, modules) = example.split_once("\n\n").unwrap();
-    let demo = read("config/demo.toml").replacen("[nodes.main]", &format!("{class}\n\n[nodes.main]"), 1);
+    let demo = include_str!("../../config/demo.toml").replacen("[nodes.main]", &format!("{class}\n\n[nodes.main]"), 1);
     let place = Place::new();
-    std::fs::write(place.path("demo.toml"), format!("{demo}\n{modules}")).unwrap();
-    std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
-    let explained = place.say(&["check", "demo.toml"]).ok();
-    assert!(explained.contains("\nRecording\n"), "{explained}");
+    place.write("demo.toml", format!("{demo}\n{modules}"));
+    place.copy("config/building.map");
+    place.say(&["check", "demo.toml"]).ok_with(["\nRecording\n"]);
 }

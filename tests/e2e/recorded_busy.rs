@@ -3,10 +3,10 @@
 //!
 //! For a long run: `ROHRPOST_BUSY_SECONDS=20 cargo test -p rohrpost-cli --test e2e recorded_busy`.
 
-use crate::harness::Place;
+use crate::harness::{Place, json_lines, times};
 use crate::load::Load;
-use rohrpost_recording::{Reader, info};
-use serde_json::Value;
+use crate::recordings::messages;
+use rohrpost_recording::info;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -17,17 +17,16 @@ const SHORT_BYTES: usize = 64 << 10;
 /// The longest message of each topic.
 fn longest(file: &Path) -> BTreeMap<String, usize> {
     let mut longest: BTreeMap<String, usize> = BTreeMap::new();
-    let mut reader = Reader::open(file).unwrap();
-    while let Some((channel, message)) = reader.next().unwrap() {
-        let bytes = longest.entry(channel.topic.as_str().to_owned()).or_default();
-        *bytes = message.data.len().max(*bytes);
+    for (topic, bytes) in messages(file, |channel, message| Some((channel.topic.to_string(), message.data.len()))) {
+        let most = longest.entry(topic).or_default();
+        *most = bytes.max(*most);
     }
     longest
 }
 
 #[test]
 fn beside_a_loop_on_each_processor_nothing_short_is_lost_and_modules_repeat_exactly() {
-    let seconds = std::env::var(SECONDS).unwrap_or_else(|_| "5".into());
+    let seconds = times(SECONDS, 5).to_string();
     let place = Place::new();
     let load = Load::begin();
     let said = place.say(&["demo", "--no-gui", "--quiet", "--seconds", &seconds, "--record", "out.mcap"]);
@@ -44,7 +43,7 @@ fn beside_a_loop_on_each_processor_nothing_short_is_lost_and_modules_repeat_exac
         assert_eq!(channel.losses.all(), channel.lost, "each loss has its cause: {channel:?}");
     }
     let said = place.say(&["replay", "--exact", "--run-recorded", "--json", "out.mcap"]).out;
-    let runs: Vec<Value> = said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let runs = json_lines(&said);
     assert!(!runs.is_empty() && runs.iter().all(|run| run["result"] == "identical"), "{runs:#?}");
     println!("{}: {} messages, lost: {}", file.display(), told.messages, told.losses.text());
     place.assert_empty();

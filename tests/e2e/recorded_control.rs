@@ -1,9 +1,10 @@
 //! Log control on a running node: by `rohrpost record`, and by TCP, also with connections that misbehave.
 
-use crate::harness::{PATIENCE, Place, wait};
+use crate::harness::{PATIENCE, until, wait};
 use crate::recorded::{Frame, RECORD, feed, feed_until_recorded, launched, numbers, wait_for_all};
+use crate::recordings::messages;
 use rohrpost::wire::from_bytes;
-use rohrpost_recording::{Reader, info};
+use rohrpost_recording::info;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::path::Path;
@@ -69,19 +70,16 @@ fn frames(files: &[&Path]) -> Vec<u64> {
 
 /// The number of the frame that a file repeats of the time before it.
 fn repeated_frame(file: &Path) -> Option<u64> {
-    let mut reader = Reader::open(file).unwrap();
-    while let Some((channel, message)) = reader.next().unwrap() {
-        if channel.topic == "feeder.0/frame" && channel.is_repeated() {
-            return Some(from_bytes::<Frame>(message.data).unwrap().number);
-        }
-    }
-    None
+    let repeated = messages(file, |channel, message| {
+        let is_it = channel.topic == "feeder.0/frame" && channel.is_repeated();
+        is_it.then(|| from_bytes::<Frame>(message.data).unwrap().number)
+    });
+    repeated.first().copied()
 }
 
 #[test]
 fn the_recorder_obeys_the_command_line() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place, RECORD);
+    let (place, mut launch, _robot) = launched(RECORD);
     let record = |words: &[&str]| place.say(&[&["record"], words, &["--timeout", "60"]].concat());
     let path = |name: &str| std::fs::canonicalize(place.path("recordings")).unwrap().join(name);
     feed_until_recorded(&place, "feeder.0");
@@ -90,13 +88,10 @@ fn the_recorder_obeys_the_command_line() {
 
     let first = feed(&place, "feeder.0", 50);
     wait_for_all(&place, &place.path("recordings/main-0001.mcap"), "feeder.0/frame", first, 1);
-    let marked = record(&["mark", "door", "open"]).ok();
-    assert!(marked.contains("main-0001.mcap\" time="), "{marked}");
-    let rotated = record(&["rotate"]).ok();
-    assert!(rotated.contains("closed=\"") && rotated.contains("main-0002.mcap"), "{rotated}");
+    record(&["mark", "door", "open"]).ok_with(["main-0001.mcap\" time="]);
+    record(&["rotate"]).ok_with(["closed=\"", "main-0002.mcap"]);
     for (path, words) in [("..", "is not below"), ("/tmp", "is not below"), ("a/b", "is no folder")] {
-        let refused = record(&["directory", path]).fails();
-        assert!(refused.contains(words), "{path}: {refused}");
+        record(&["directory", path]).fails_with([words]);
     }
     let moved = record(&["directory", "run 7"]).ok();
     let folder = path("run 7");
@@ -104,12 +99,11 @@ fn the_recorder_obeys_the_command_line() {
     let last = feed(&place, "feeder.0", 50);
     wait_for_all(&place, &folder.join("main-0001.mcap"), "feeder.0/frame", last, 1);
 
-    let ended = record(&["off"]).ok();
-    assert!(ended.contains(" lost=0 files="), "{ended}");
+    record(&["off"]).ok_with([" lost=0 files="]);
     assert!(record(&["status"]).ok().starts_with("recording=off"));
-    wait("status says that nothing is recorded", || {
+    until("status says that nothing is recorded", || {
         let said = place.say(&["status", "logd.0", "--json"]).json();
-        (said[0]["error"] == "records nothing: log control has switched it off").then_some(())
+        said[0]["error"] == "records nothing: log control has switched it off"
     });
     for words in [&["mark", "late"][..], &["rotate"]] {
         assert!(record(words).fails().contains("nothing is recorded; say `on` first"));
@@ -120,7 +114,6 @@ fn the_recorder_obeys_the_command_line() {
     assert_eq!(record(&["on"]).ok(), begun, "it is on");
     wait("a line is recorded", || told(&record(&["status"]).ok(), "written").filter(|written| written != "0"));
     feed_until_recorded(&place, "feeder.0");
-    drop(robot);
     launch.stop();
 
     let told = info(&path("main-0001.mcap")).unwrap();
@@ -140,9 +133,8 @@ fn the_recorder_obeys_the_command_line() {
 
 #[test]
 fn connections_are_answered_line_by_line_and_none_holds_the_recorder_up() {
-    let place = Place::new();
     let address = own_address(21_121);
-    let (mut launch, robot) = launched(&place, &controlled(RECORD, address));
+    let (place, mut launch, _robot) = launched(&controlled(RECORD, address));
     feed_until_recorded(&place, "feeder.0");
     let before = feed(&place, "feeder.0", 10);
 
@@ -206,7 +198,6 @@ fn connections_are_answered_line_by_line_and_none_holds_the_recorder_up() {
     });
     let mut one = ControlConnection::open(address);
     assert!(told(&one.ask("off"), "written").is_some());
-    drop(robot);
     launch.stop();
     assert_eq!(one.hear(), "", "the connection ends with the recorder");
     let files =
@@ -219,9 +210,8 @@ fn connections_are_answered_line_by_line_and_none_holds_the_recorder_up() {
 /// Both come at the same time, and the command line fetches its answers.
 #[test]
 fn a_connection_that_chatters_takes_no_answers_from_the_command_line() {
-    let place = Place::new();
     let address = own_address(21_123);
-    let (mut launch, robot) = launched(&place, &controlled(RECORD, address));
+    let (place, mut launch, _robot) = launched(&controlled(RECORD, address));
     feed_until_recorded(&place, "feeder.0");
     let ends = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -238,23 +228,20 @@ fn a_connection_that_chatters_takes_no_answers_from_the_command_line() {
         assert!(chatter.join().unwrap() >= 40, "or nothing was tried");
         told.into_iter().for_each(|told| drop(told.ok()));
     });
-    drop(robot);
     launch.stop();
 }
 
 /// Recording does not depend on it.
 #[test]
 fn a_port_that_is_taken_is_told_and_used_once_it_is_free() {
-    let place = Place::new();
     let address = own_address(21_122);
     let taken = std::net::TcpListener::bind(address).unwrap();
-    let (mut launch, robot) = launched(&place, &controlled(RECORD, address));
+    let (place, mut launch, _robot) = launched(&controlled(RECORD, address));
     feed_until_recorded(&place, "feeder.0");
     let errors = || place.say(&["log", "--timeout", "60", "--module", "logd.0", "--level", "error"]).out;
     let error = wait("an error", || Some(errors()).filter(|lines| lines.contains("log control: cannot listen at")));
     assert!(error.contains(&address.to_string()) && error.contains("records all the same"), "{error}");
     drop(taken);
     assert!(ControlConnection::open(address).ask("status").starts_with("OK recording=on "));
-    drop(robot);
     launch.stop();
 }

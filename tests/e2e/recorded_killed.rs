@@ -5,11 +5,10 @@
 //! With `ROHRPOST_MCAP_PYTHON`, a Python that has `mcap`, that reads all files, too, with all checksums:
 //! `docs/src/proof.md` says how.
 
-use crate::harness::{Place, Robot, signal, wait};
+use crate::harness::{Place, Robot, times, until, wait};
 use crate::recorded::{feed_until_recorded, launched_with, numbers};
 use crate::recorded_control::{ControlConnection, controlled, own_address, told};
 use crate::small_memory::{may_mount, with_small_memory};
-use nix::sys::signal::Signal;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use rohrpost_recording::{info, is_closed, recover, recovered_path};
@@ -51,11 +50,6 @@ leave-free = "0 B"
 flush = "2 ms"
 sync = "4 ms"
 "#;
-
-/// How often it is killed: for a long run, `ROHRPOST_KILLS=100 cargo test -p rohrpost-cli --test e2e recorded_killed`.
-fn kills() -> u32 {
-    std::env::var("ROHRPOST_KILLS").ok().map_or(10, |kills| kills.parse().unwrap())
-}
 
 /// What is wrong when it is killed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,13 +128,13 @@ impl Torture {
         let (mut launch, robot) = launched_with(&self.place, LOGD, &record);
         feed_until_recorded(&self.place, "feeder.0");
         self.place.say(&["call", "feeder.0", "feed", ENDLESS]).ok();
-        let kills = kills();
+        // For a long run: `ROHRPOST_KILLS=100 cargo test -p rohrpost-cli --test e2e recorded_killed`.
+        let kills = times("ROHRPOST_KILLS", 10);
         for round in 0..kills {
             self.round(round, trouble_of(round), &robot);
             launch.assert_runs();
         }
         let began = self.root_files(kills);
-        drop(robot);
         launch.stop();
         let folder = self.recordings().join(format!("round-{kills}"));
         let ended = [began, files(&folder)].concat();
@@ -163,9 +157,9 @@ impl Torture {
     /// that a disk took which was full again at once.
     fn root_files(&self, round: u32) -> Vec<PathBuf> {
         let folder = format!("round-{round}");
-        wait(format!("the recorder goes to {folder}"), || {
+        until(format!("the recorder goes to {folder}"), || {
             let answer = ControlConnection::open(self.address).ask(&format!("directory {folder}"));
-            answer.starts_with("OK ").then_some(())
+            answer.starts_with("OK ")
         });
         let kept = self.place.path(&format!("{folder}-before"));
         std::fs::create_dir(&kept).unwrap();
@@ -207,9 +201,7 @@ impl Torture {
             control.say(b"rotate\n");
         }
         self.pause(4_000);
-        let pid = robot.pid("logd.0");
-        signal(pid, Signal::SIGKILL);
-        robot.wait_restarted("logd.0", pid);
+        robot.kill("logd.0");
         let _ = std::fs::remove_file(&ballast);
         self.remove_before(round);
         let left = if trouble == Trouble::Away { away } else { folder };
@@ -237,7 +229,7 @@ impl Torture {
                     // A disk that is full has no room for one, and the recorder says so.
                     if trouble != Trouble::Full {
                         let made = recovered_path(file);
-                        wait(format!("{} is there", made.display()), || made.exists().then_some(()));
+                        until(format!("{} is there", made.display()), || made.exists());
                         all.push(moved(&made, &kept));
                     }
                     let file = moved(file, &kept);

@@ -1,21 +1,12 @@
 //! A recorder hears modules of other nodes, over a network that loses packages: what is lost is counted.
 
-use crate::harness::{NETWORK, OUTPUT, Place, RECORDED_CLASSES, lacks_namespaces, wait};
-use crate::process::Running;
-use crate::recorded::{Frame, feed, feed_until_recorded, feeder_entry, lines, noise};
-use rohrpost::wire::from_bytes;
-use rohrpost_recording::{Reader, info};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, until};
+use crate::network::{NETWORK, at, launched_all, nodes};
+use crate::recorded::{feed, feed_until_recorded, feeder_entry, lines, number};
+use crate::recordings::messages;
+use rohrpost_recording::{Message, info};
 use std::path::Path;
 use std::time::Duration;
-
-const NODES: &str = r#"
-[nodes.base]
-address = "10.77.0.1"
-tools = [0, 15]
-[nodes.arm]
-address = "10.77.0.2"
-tools = [16, 31]
-"#;
 
 const LOGD: &str = r#"
 [[module]]
@@ -40,50 +31,29 @@ const REPEATS_REFUSED: Duration = Duration::from_secs(3);
 
 /// Numbers of packages and of the values in them.
 pub(crate) fn values(file: &Path, topic: &str) -> Vec<(u32, u64)> {
-    let mut values = Vec::new();
-    let Ok(mut reader) = Reader::open(file) else { return values };
-    while let Ok(Some((channel, message))) = reader.next() {
-        if channel.topic != topic {
-            continue;
-        }
-        let number = if topic.ends_with("/count") {
-            from_bytes(message.data).unwrap()
-        } else {
-            let frame: Frame = from_bytes(message.data).unwrap();
-            assert!(frame.bytes == noise(frame.number), "frame {} has other bytes", frame.number);
-            frame.number
-        };
-        values.push((message.sequence, number));
-    }
-    values
+    let value = |message: &Message<'_>| (message.sequence, number(topic, message.data));
+    messages(file, |channel, message| (channel.topic == topic).then(|| value(message)))
 }
 
 /// Feeds until one that was sent after `target` values is in the file: all before it are there, or known to be missing.
 fn feed_beyond(place: &Place, file: &Path, topic: &str, target: u64) {
-    wait(format!("{topic} is recorded up to {target}"), || {
+    until(format!("{topic} is recorded up to {target}"), || {
         feed(place, "feeder.0", 1);
-        values(file, topic).last().is_some_and(|(_, number)| *number >= target).then_some(())
+        values(file, topic).last().is_some_and(|(_, number)| *number >= target)
     });
 }
 
 #[test]
 fn data_and_output_of_another_node_are_recorded_or_counted() {
     let place = Place::new();
-    let at = |node: &str, entry: &str| entry.replacen("[[module]]\n", &format!("[[module]]\nnode = \"{node}\"\n"), 1);
     let modules = [at("base", OUTPUT), at("arm", &feeder_entry(0)), LOGD.to_owned()];
-    let config = place.config_of("test", NODES, &[RECORDED_CLASSES, NETWORK, &modules.concat()]);
+    let config = place.config_of(
+        "test",
+        &nodes([("base", "10.77.0.1"), ("arm", "10.77.0.2")]),
+        &[&RECORDED_CLASSES, NETWORK, &modules.concat()],
+    );
     let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=11"];
-    let launch = [&["launch", config.to_str().unwrap(), "--all"][..], &bad].concat();
-    let mut launch = Running::start(place.command(&launch));
-    // It ends at once where there are none.
-    let begun = wait("both nodes run", || {
-        let runs = ["base", "arm"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
-        if runs { Some(true) } else { launch.err().contains("cannot be made here").then_some(false) }
-    });
-    if !begun {
-        assert!(lacks_namespaces(&launch.err()));
-        return;
-    }
+    let Some(mut launch) = launched_all(&place, &config, &["base", "arm"], &bad) else { return };
     // A repeat that comes in a server's first seconds is refused: it cannot know whether one before it ran the command.
     std::thread::sleep(REPEATS_REFUSED);
     let file = place.path("recordings/base-0001.mcap");
@@ -92,9 +62,9 @@ fn data_and_output_of_another_node_are_recorded_or_counted() {
     let target = feed(&place, "feeder.0", 300);
     topics.iter().for_each(|topic| feed_beyond(&place, &file, topic, target));
     // A line may be lost; the next one says so.
-    wait("a line of the other node", || {
+    until("a line of the other node", || {
         ["off", "on"].iter().for_each(|word| drop(place.say(&["call", "feeder.0", word]).ok()));
-        lines(&file).iter().any(|line| line == "is off").then_some(())
+        lines(&file).iter().any(|line| line == "is off")
     });
     launch.stop();
 

@@ -1,15 +1,16 @@
 //! `rohrpost replay` of a robot that was recorded: played and recorded again it is the same; a fresh mapper draws the
 //! same map; and the replay is paused, stepped and sought by calls.
 
-use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, until, wait};
 use crate::process::Running;
+use crate::recordings::{self, messages};
 use rohrpost::interfaces::{LaserInterface, WheelsInterface};
 use rohrpost::schema::Type;
 use rohrpost::types::OccupancyGrid;
 use rohrpost::wire::from_bytes;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{StreamId, SystemClock};
-use rohrpost_recording::{ChannelSpec, Message, Options, Reader, Session, Writer, info};
+use rohrpost_recording::{Message, RecordedChannel, Session, info};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -94,31 +95,27 @@ fn recorded_so_far(place: &Place) -> (u64, u64, u64) {
 
 /// Some seconds of a robot that drives and maps, from its first value on.
 fn record(place: &Place) -> PathBuf {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
-    let config = place.config(&[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
+    place.copy("config/building.map");
+    let config = place.config(&[&RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
-    wait("the modules are there", || {
+    until("the modules are there", || {
         launch.assert_runs();
-        ["logd.0", "mapper.0", "pilot.0"].iter().all(|module| robot.state(module) == "on").then_some(())
+        ["logd.0", "mapper.0", "pilot.0"].iter().all(|module| robot.state(module) == "on")
     });
-    wait("mapper and recorder listen", || (readers(&robot) == 4).then_some(()));
-    wait("the recorder knows of all", || {
-        (call(place, "logd.0", &["recording"])["channels"].as_u64() >= Some(6)).then_some(())
-    });
+    until("mapper and recorder listen", || readers(&robot) == 4);
+    until("the recorder knows of all", || call(place, "logd.0", &["recording"])["channels"].as_u64() >= Some(6));
     place.say(&["call", "motor.0", "on"]).ok();
-    wait("it has mapped", || {
+    until("it has mapped", || {
         launch.assert_runs();
-        (call(place, "mapper.0", &["counts"])["mapped"].as_u64() > Some(40)).then_some(())
+        call(place, "mapper.0", &["counts"])["mapped"].as_u64() > Some(40)
     });
     place.say(&["call", "motor.0", "off"]).ok();
     // All that changed of the map is published within half a second.
     let clock = SystemClock::open(&robot.node);
     let off_ns = clock.now().ns;
-    wait("the map is published", || (clock.now().ns > off_ns + 5_000_000_000).then_some(()));
-    wait("all is written", || (recorded_so_far(place).2 == 0).then_some(()));
-    drop(robot);
+    until("the map is published", || clock.now().ns > off_ns + 5_000_000_000);
+    until("all is written", || recorded_so_far(place).2 == 0);
     launch.stop();
     let file = place.path("recordings/main-0001.mcap");
     assert_eq!(info(&file).unwrap().lost, 0);
@@ -128,12 +125,10 @@ fn record(place: &Place) -> PathBuf {
 /// All of a file by topic, in the order in which it came.
 fn values(file: &Path) -> BTreeMap<String, Vec<Recorded>> {
     let mut values: BTreeMap<String, Vec<Recorded>> = BTreeMap::new();
-    let mut reader = Reader::open(file).unwrap();
-    while let Some((channel, message)) = reader.next().unwrap() {
-        let Message { stamp_ns, epoch, data, .. } = message;
-        let value = Recorded { stamp_ns, epoch, bytes: data.to_vec() };
-        values.entry(channel.topic.to_string()).or_default().push(value);
-    }
+    let read = |channel: &RecordedChannel, &Message { stamp_ns, epoch, data, .. }: &Message<'_>| {
+        Some((channel.topic.to_string(), Recorded { stamp_ns, epoch, bytes: data.to_vec() }))
+    };
+    messages(file, read).into_iter().for_each(|(topic, value)| values.entry(topic).or_default().push(value));
     values
 }
 
@@ -148,15 +143,9 @@ fn map(values: &[Recorded]) -> BTreeMap<String, Vec<u8>> {
 
 /// How long after the begin of a file the first value of a topic arrived.
 fn seconds_to(file: &Path, topic: &str) -> f64 {
-    let mut reader = Reader::open(file).unwrap();
-    let mut begin_ns = None;
-    while let Some((channel, message)) = reader.next().unwrap() {
-        let begin_ns = *begin_ns.get_or_insert(message.arrival_ns);
-        if channel.topic == topic {
-            return (message.arrival_ns - begin_ns) as f64 / 1e9;
-        }
-    }
-    panic!("no {topic}")
+    let came = messages(file, |channel, message| Some((channel.topic == topic, message.arrival_ns)));
+    let (_, first_ns) = came.iter().find(|(is_it, _)| *is_it).unwrap_or_else(|| panic!("no {topic}"));
+    (first_ns - came[0].1) as f64 / 1e9
 }
 
 /// Goes there, and waits for the epoch that begins there.
@@ -171,12 +160,12 @@ fn seek(place: &Place, at_s: f64) -> Value {
 
 pub(crate) fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
     let all = [&["replay", file.to_str().unwrap(), "--quiet", "--no-gui"], words].concat();
-    Running::start(place.command(&all))
+    place.start(&all)
 }
 
 /// The node of a replay.
 fn replaying(place: &Place, replay: &mut Running) -> Robot {
-    let config = place.config_of("test-replay", "[nodes.main]", &[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
+    let config = place.config_of("test-replay", "[nodes.main]", &[&RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     Installation::load(&config).unwrap();
     let robot = place.robot(&config, "replay", replay);
     wait("the player is there", || {
@@ -190,18 +179,17 @@ fn replaying(place: &Place, replay: &mut Running) -> Robot {
 fn what_is_replayed_and_recorded_again_is_the_same_and_a_fresh_mapper_draws_the_same_map() {
     let place = Place::new();
     let first = record(&place);
-    let told = place.say(&["replay", first.to_str().unwrap(), "--run", "logd.0"]).fails();
-    assert!(told.contains("it would write files into\n  ") && told.contains("add --run-recorded to let it"), "{told}");
+    let said = place.say(&["replay", first.to_str().unwrap(), "--run", "logd.0"]);
+    said.fails_with(["it would write files into\n  ", "add --run-recorded to let it"]);
     let words = ["--run", "mapper.0", "--run", "logd.0", "--run-recorded", "--rate", "5", "--paused"];
     let mut replay = replay(&place, &first, &words);
     let robot = replaying(&place, &mut replay);
-    wait("all listen", || {
+    until("all listen", || {
         replay.assert_runs();
-        (readers(&robot) == 4 && call(&place, "logd.0", &["recording"])["channels"].as_u64() >= Some(7)).then_some(())
+        readers(&robot) == 4 && call(&place, "logd.0", &["recording"])["channels"].as_u64() >= Some(7)
     });
     assert_eq!(position(&place)["played"], 0);
     place.say(&["call", "replay.0", "resume"]).ok();
-    drop(robot);
     let said = replay.said();
     assert_eq!(said.code, Some(0), "{said:?}");
     assert!(said.out.contains(" values of ") && said.out.contains("error of spacing at rate 5: "), "{said:?}");
@@ -228,8 +216,7 @@ fn a_replay_is_paused_stepped_and_sought_by_calls() {
     let place = Place::new();
     let first = record(&place);
     let file = first.to_str().unwrap();
-    let told = place.say(&["replay", file, "--from", "+2s", "--until", "+1s"]).fails();
-    assert!(told.contains("the time range is empty"), "{told}");
+    place.say(&["replay", file, "--from", "+2s", "--until", "+1s"]).fails_with(["the time range is empty"]);
     let told = place.say(&["replay", file, "--run", "mapper.7"]).fails();
     assert!(told.contains("--run mapper.7: the configuration has no such module; it has output.0"), "{told}");
     let mut replay = replay(&place, &first, &["--paused"]);
@@ -258,7 +245,7 @@ fn a_replay_is_paused_stepped_and_sought_by_calls() {
     wait("it plays on", || Some(position(&place)).filter(played(sought["played"].as_u64().unwrap() + 20)));
     assert_eq!(clock.record().unwrap().pace_ppb, 3_000_000_000);
     place.say(&["call", "replay.0", "pause"]).ok();
-    wait("time stands still", || (clock.record().unwrap().pace_ppb == 0).then_some(()));
+    until("time stands still", || clock.record().unwrap().pace_ppb == 0);
     for (words, told) in [
         (["replay.0", "rate", "0"].as_slice(), "Rate(0)"),
         (&["replay.0", "seek", "1000000"], "at_s: 1000000"),
@@ -275,7 +262,6 @@ fn a_replay_is_paused_stepped_and_sought_by_calls() {
     assert_eq!(at_end["paused"], true);
     let sought = seek(&place, drives_s);
     assert_eq!((&sought["paused"], &sought["ended"]), (&true.into(), &false.into()));
-    drop(robot);
     let said = replay.stop();
     assert!(said.contains(" values of ") && said.contains(" s, to "), "{said}");
     place.assert_empty();
@@ -284,14 +270,11 @@ fn a_replay_is_paused_stepped_and_sought_by_calls() {
 #[test]
 fn what_cannot_be_replayed_is_refused_in_words() {
     let place = Place::new();
-    let options = Options { leave_bytes: 0, ..Options::new(place.path(""), "old") };
-    let mut writer = Writer::start(options, Session::default()).unwrap();
-    let spec = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
-    let speed = writer.channel(&spec).unwrap();
+    let mut writer = recordings::begin(&place, "old", Session::default());
+    let speed = recordings::channel(&mut writer, "motor.0", "speed", &Type::U8);
     writer.write(speed, &Message { arrival_ns: 1, stamp_ns: 1, epoch: 1, sequence: 0, data: &[7] }).unwrap();
-    writer.finish().1.unwrap();
-    let told = place.say(&["replay", "old-0001.mcap"]).fails();
-    assert!(told.contains("does not describe its modules, as it was recorded by an older version"), "{told}");
-    let told = place.say(&["replay", "nowhere.mcap"]).fails();
-    assert!(told.contains("nowhere.mcap"), "{told}");
+    recordings::end(&place, "old", writer);
+    let said = place.say(&["replay", "old-0001.mcap"]);
+    said.fails_with(["does not describe its modules, as it was recorded by an older version"]);
+    place.say(&["replay", "nowhere.mcap"]).fails_with(["nowhere.mcap"]);
 }

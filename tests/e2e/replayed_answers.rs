@@ -1,10 +1,10 @@
 //! Commands to modules that are played: they get the answers that the modules' journals have, or a fault that says why
 //! not.
 
-use crate::harness::{Place, RECORDED_CLASSES, wait};
+use crate::exact::count;
+use crate::harness::{Place, RECORDED_CLASSES, until, wait};
 use crate::replayed::{call, position, replay};
-use rohrpost_recording::{Reader, info};
-use std::path::Path;
+use rohrpost_recording::info;
 
 const MODULES: &str = r#"
 [time]
@@ -35,41 +35,29 @@ leave-free = "0 B"
 flush = "20 ms"
 "#;
 
-/// Messages of a topic in a file that is being written.
-fn count(file: &Path, topic: &str) -> usize {
-    let Ok(mut reader) = Reader::open(file) else { return 0 };
-    let mut count = 0;
-    while let Ok(Some((channel, _))) = reader.next() {
-        count += usize::from(channel.topic == topic);
-    }
-    count
-}
-
 #[test]
 fn a_command_to_a_played_module_gets_the_answer_that_was_recorded_for_it() {
     let place = Place::new();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
+    place.copy("config/building.map");
     let file = place.path("recordings/main-0001.mcap");
-    let (mut launch, robot) = place.launched(&[RECORDED_CLASSES, MODULES]);
-    let journaled = || ["motor.0/journal", "mapper.0/journal"].map(|topic| count(&file, topic));
-    wait("journals are recorded", || journaled().iter().all(|count| *count > 0).then_some(()));
+    let (mut launch, _robot) = place.launched(&[&RECORDED_CLASSES, MODULES]);
+    let journaled = || ["motor.0", "mapper.0"].map(|module| count(&file, module, |_| true));
+    until("journals are recorded", || journaled().iter().all(|count| *count > 0));
     let drive = ["call", "motor.0", "drive", "0.25", "0.125"];
     let driven = place.say(&drive).ok();
     let early = call(&place, "mapper.0", &["counts"]);
-    wait("it maps on", || (call(&place, "mapper.0", &["counts"])["mapped"] != early["mapped"]).then_some(()));
+    until("it maps on", || call(&place, "mapper.0", &["counts"])["mapped"] != early["mapped"]);
     let before = journaled();
-    wait("the journals go on", || {
+    until("the journals go on", || {
         let now = journaled();
-        (now[0] > before[0] + 2 && now[1] > before[1] + 2).then_some(())
+        now[0] > before[0] + 2 && now[1] > before[1] + 2
     });
     let late = call(&place, "mapper.0", &["counts"]);
     let before = journaled();
-    wait("the journals go on", || {
+    until("the journals go on", || {
         let now = journaled();
-        (now[0] > before[0] + 2 && now[1] > before[1] + 2).then_some(())
+        now[0] > before[0] + 2 && now[1] > before[1] + 2
     });
-    drop(robot);
     launch.stop();
     assert_eq!(info(&file).unwrap().lost, 0);
 
@@ -83,7 +71,7 @@ fn a_command_to_a_played_module_gets_the_answer_that_was_recorded_for_it() {
     assert_eq!(call(&place, "mapper.0", &["counts"]), early, "that at the beginning");
     let near_end_s = begun["length_s"].as_f64().unwrap() - 0.3;
     place.say(&["call", "replay.0", "seek", &format!("{near_end_s:.6}")]).ok();
-    wait("it is near its end", || (position(&place)["at_s"].as_f64() > Some(0.0)).then_some(()));
+    until("it is near its end", || position(&place)["at_s"].as_f64() > Some(0.0));
     assert_eq!(call(&place, "mapper.0", &["counts"]), late, "that at the end");
     assert_eq!(place.say(&drive).ok(), driven, "it was given once");
     for (words, told) in [
@@ -93,6 +81,5 @@ fn a_command_to_a_played_module_gets_the_answer_that_was_recorded_for_it() {
         let refused = place.say(words);
         assert!(refused.code != Some(0) && refused.err.contains(told), "{refused:?}");
     }
-    replay.stop();
-    place.assert_empty();
+    place.end(&mut replay);
 }

@@ -1,23 +1,15 @@
 //! A replay that begins in the middle of things: at a later file, at a time, behind a seek, or over and over.
 
-use crate::harness::{Place, wait};
+use crate::harness::{Place, head, until, wait};
 use crate::process::Running;
+use crate::recordings;
 use crate::replayed::{call, position, replay};
 use rohrpost::schema::{DataItem, DataKind, Description, Field, Type};
-use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
-use std::collections::BTreeMap;
+use rohrpost_recording::{Message, Writer};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-const CONFIG: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-calib = { id = 90 }
-laser = { id = 100 }
-tool = { id = 16 }
+const MODULES: &str = r#"
 [nodes.main]
 [[module]]
 name = "calib.0"
@@ -38,14 +30,12 @@ fn description(class: &str, item: &str, kind: DataKind) -> Description {
 
 /// Two files of one recording: an offset, which comes once, and a scan each tenth of a second, six in a file.
 fn two_files(place: &Place) -> [PathBuf; 2] {
-    let configuration = BTreeMap::from([("robot.toml".to_owned(), CONFIG.to_owned())]);
-    let options = Options { leave_bytes: 0, ..Options::new(place.path(""), "main") };
-    let mut writer = Writer::start(options, Session { configuration, ..Session::default() }).unwrap();
+    let session = recordings::session("", "robot.toml", &(head("calib 90, laser 100, tool 16") + MODULES));
+    let mut writer = recordings::begin(place, "main", session);
     let mut channel = |class: &str, item: &str, kind: DataKind| {
         let name = format!("{class}.0");
         writer.describe(&name, &description(class, item, kind)).unwrap();
-        let spec = ChannelSpec { name: &name, item, ty: &Type::U8, texts: BTreeMap::new() };
-        writer.channel(&spec).unwrap()
+        recordings::channel(&mut writer, &name, item, &Type::U8)
     };
     let offset = channel("calib", "offset", DataKind::Data);
     let scan = channel("laser", "scan", DataKind::Stream);
@@ -67,10 +57,10 @@ fn two_files(place: &Place) -> [PathBuf; 2] {
 
 /// Waits until so many older values were played.
 fn wait_older(place: &Place, replay: &mut Running, count: u64) {
-    wait("what is older is played", || {
+    until("what is older is played", || {
         replay.assert_runs();
         let said = place.say(&["call", "replay.0", "position", "--json"]);
-        (said.code == Some(0) && said.json()["older"] == count).then_some(())
+        said.code == Some(0) && said.json()["older"] == count
     });
 }
 
@@ -83,8 +73,8 @@ fn scan(place: &Place) -> u64 {
 fn a_later_file_is_played_with_what_its_info_says_it_begins_with() {
     let place = Place::new();
     let [_, second] = two_files(&place);
-    let told = place.say(&["record", "info", second.to_str().unwrap()]).ok();
-    assert!(told.contains("begins with the newest of earlier, which is not counted, of calib.0/offset"), "{told}");
+    let said = place.say(&["record", "info", second.to_str().unwrap()]);
+    said.ok_with(["begins with the newest of earlier, which is not counted, of calib.0/offset"]);
     let part = place.path("part.mcap");
     let cut = ["record", "cut", second.to_str().unwrap(), "-o", part.to_str().unwrap(), "--names", "calib.0"];
     assert!(place.say(&cut).ok().contains(": 0 messages, "));
@@ -111,7 +101,7 @@ fn from_a_time_on_and_behind_a_seek_each_stream_and_value_is_the_newest_of_befor
     let began = position(&place);
     assert_eq!((&began["played"], &began["at_s"]), (&0.into(), &0.35.into()), "time is what was asked for");
     place.say(&["call", "replay.0", "step"]).ok();
-    wait("a value is played", || (position(&place)["played"] == 1).then_some(()));
+    until("a value is played", || position(&place)["played"] == 1);
     assert_eq!(scan(&place), 4);
     for (older, at_s, newest) in [(4, "0.95", 9), (6, "0.25", 2), (6, "0", 2)] {
         place.say(&["call", "replay.0", "seek", at_s]).ok();
@@ -142,6 +132,5 @@ fn a_looped_part_without_length_takes_a_tenth_of_a_second_a_round() {
     let least = Duration::from_millis(100) * (after - before - 1) as u32;
     assert!(began.elapsed() >= least - Duration::from_millis(50), "{} rounds in {:?}", after - before, began.elapsed());
     assert!(call(&place, "calib.0", &["get", "offset"]) == OFFSET);
-    replay.stop();
-    place.assert_empty();
+    place.end(&mut replay);
 }

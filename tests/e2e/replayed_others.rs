@@ -1,14 +1,16 @@
 //! `rohrpost replay` of what rosbag2 recorded: its messages come into streams byte for byte, with their stamps, and as
 //! far apart as they came.
 
-use crate::harness::{Place, wait};
+use crate::conforming::hex;
+use crate::harness::{Place, head, until, wait};
 use crate::process::Running;
+use crate::recordings::messages;
 use crate::replayed::{call, position, replay};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use rohrpost::schema::Bytes;
 use rohrpost::wire::from_bytes;
-use rohrpost_recording::{Reader, Selection, cut, merge, recover};
+use rohrpost_recording::{Selection, cut, merge, recover};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,17 +29,6 @@ const CHANNELS: [(&str, &str, &str, &str); 3] = [
 
 /// The module `logd.0` records what is played into its streams; images are longer than records of theirs.
 const RECORDED_AGAIN: &str = r#"
-installation = "again"
-[system]
-name = "robot"
-id = 1
-[classes]
-laser = { id = 150 }
-camera = { id = 140 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
 [nodes.main]
 [[module]]
 name = "logd.0"
@@ -104,10 +95,6 @@ pub(crate) fn bag_that_says(place: &Place, text: &str) -> PathBuf {
     path
 }
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 /// Waits until the player has a position.
 fn begun(place: &Place, replay: &mut Running) -> Value {
     wait("time begins", || {
@@ -136,28 +123,27 @@ fn topics_of_another_program_are_listed_and_played_into_streams_that_are_named()
     let mut replay = replay(&place, &file, &into);
     begun(&place, &mut replay);
     place.say(&["call", "replay.0", "step"]).ok();
-    wait("a message is played", || (position(&place)["played"] == 1).then_some(()));
+    until("a message is played", || position(&place)["played"] == 1);
     let read = newest(&place, "laser.0", "scan");
     assert_eq!(read["value"]["hex"], hex(&message(0, 0)), "{read}");
     assert!(read.to_string().contains(&times(0, 0).0.to_string()), "{read}");
-    let about = place.say(&["call", "laser.0"]).ok();
-    assert!(about.contains("Messages of /scan: sensor_msgs/msg/LaserScan cdr ros2msg"), "{about}");
+    place.say(&["call", "laser.0"]).ok_with(["Messages of /scan: sensor_msgs/msg/LaserScan cdr ros2msg"]);
 
     place.say(&["call", "replay.0", "seek", "1.0"]).ok();
     place.say(&["call", "replay.0", "step_by", "0.26"]).ok();
-    wait("messages are played", || (position(&place)["played"].as_u64() >= Some(13)).then_some(()));
+    until("messages are played", || position(&place)["played"].as_u64() >= Some(13));
     assert_eq!(newest(&place, "laser.0", "scan")["value"]["hex"], hex(&message(0, 25)));
     assert_eq!(newest(&place, "camera.0", "image")["value"]["hex"], hex(&message(1, 25)));
 
     // Stepped to its end it stays, until it is told otherwise.
     place.say(&["call", "replay.0", "step_by", "10"]).ok();
-    wait("it is at its end", || (position(&place)["ended"] == true).then_some(()));
+    until("it is at its end", || position(&place)["ended"] == true);
     assert_eq!(position(&place)["paused"], true);
     assert_eq!(newest(&place, "camera.0", "image")["value"]["hex"], hex(&message(1, COUNT - 1)));
     place.say(&["call", "replay.0", "seek", "0.5"]).ok();
-    wait("it is no more", || (position(&place)["ended"] == false).then_some(()));
+    until("it is no more", || position(&place)["ended"] == false);
     place.say(&["call", "replay.0", "step_by", "10"]).ok();
-    wait("it is at its end again", || (position(&place)["ended"] == true).then_some(()));
+    until("it is at its end again", || position(&place)["ended"] == true);
     place.say(&["call", "replay.0", "resume"]).ok();
     let said = replay.said();
     assert_eq!(said.code, Some(0), "{said:?}");
@@ -167,31 +153,25 @@ fn topics_of_another_program_are_listed_and_played_into_streams_that_are_named()
 
 /// Stamps and bytes of a topic, and when they came.
 fn recorded(file: &Path, topic: &str) -> Vec<(u64, Vec<u8>, u64)> {
-    let mut reader = Reader::open(file).unwrap();
-    let mut all = Vec::new();
-    while let Some((channel, message)) = reader.next().unwrap() {
-        if channel.topic == topic {
-            let Bytes(bytes) = from_bytes(message.data).unwrap();
-            all.push((message.stamp_ns, bytes, message.arrival_ns));
-        }
-    }
-    all
+    messages(file, |channel, message| {
+        let bytes = || from_bytes::<Bytes>(message.data).unwrap().0;
+        (channel.topic == topic).then(|| (message.stamp_ns, bytes(), message.arrival_ns))
+    })
 }
 
 #[test]
 fn what_others_recorded_is_played_byte_for_byte_and_what_is_too_long_is_counted() {
     let place = Place::new();
     let file = bag(&place);
-    let config = place.path("again.toml");
-    std::fs::write(&config, RECORDED_AGAIN).unwrap();
+    let config = place.write("again.toml", head("laser 150, camera 140, logd 24, tool 16") + RECORDED_AGAIN);
     let config = config.to_str().unwrap();
     let into = ["--into", "/scan=laser.0/scan", "/image=camera.0/image"];
     let more = ["--config", config, "--run", "logd.0", "--rate", "2", "--paused"];
     let mut replay = replay(&place, &file, &[&into[..], &more].concat());
     begun(&place, &mut replay);
-    wait("the recorder listens", || {
+    until("the recorder listens", || {
         replay.assert_runs();
-        (call(&place, "logd.0", &["recording"])["channels"].as_u64() >= Some(2)).then_some(())
+        call(&place, "logd.0", &["recording"])["channels"].as_u64() >= Some(2)
     });
     place.say(&["call", "replay.0", "resume"]).ok();
     let said = replay.said();

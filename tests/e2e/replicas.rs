@@ -1,11 +1,10 @@
 //! A stream of one node is read on another as if it were written there: by this test, by the recorder and by tools.
 
-use crate::harness::{NETWORK, OUTPUT, Place, Robot, lacks_namespaces, signal, wait};
-use crate::lan::addresses;
+use crate::harness::{OUTPUT, Place, Robot, head, until, wait};
+use crate::network::{NETWORK, Network, addresses, at, launched_all, nodes};
 use crate::process::Running;
 use crate::recorded::{Frame, feed, feeder_entry, noise};
 use crate::recorded_nodes::values;
-use nix::sys::signal::Signal;
 use rohrpost::Name;
 use rohrpost::wire::from_bytes;
 use rohrpost_mailbox::{Missed, Next, Participant, RecordInfo, StreamId, StreamReader};
@@ -14,20 +13,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-feeder = { id = 96 }
-output = { id = 32 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-"#;
+const CLASSES: &str = "router 250, feeder 96, output 32, logd 24, tool 16";
 
 const LOGD: &str = r#"
 [[module]]
@@ -72,14 +58,9 @@ source = "master"
 
 /// `network`: that section, and further ones.
 fn config(place: &Place, [base, brain]: &[String; 2], network: &str) -> PathBuf {
-    let config = place.path("test.toml");
-    let at = |node: &str, entry: &str| entry.replacen("[[module]]\n", &format!("[[module]]\nnode = \"{node}\"\n"), 1);
-    let nodes = format!(
-        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.brain]\naddress = \"{brain}\"\ntools = [16, 31]\n"
-    );
+    let nodes = nodes([("base", base), ("brain", brain)]);
     let modules = [at("base", OUTPUT), at("base", &feeder_entry(0)), LOGD.to_owned()].concat();
-    std::fs::write(&config, [HEAD, &nodes, network, &modules].concat()).unwrap();
-    config
+    place.write("test.toml", [&head(CLASSES), &nodes, network, &modules].concat())
 }
 
 /// A reader on a node, and all that it has read.
@@ -113,73 +94,40 @@ impl Follower {
 }
 
 /// Two nodes on this computer, at addresses of the loopback device.
-pub(crate) struct Pair {
-    pub(crate) place: Place,
-    pub(crate) config: PathBuf,
-    pub(crate) base: (Running, Robot),
-    pub(crate) brain: (Running, Robot),
+pub(crate) fn launched_at(addresses: &[String; 2], network: &str) -> Network {
+    launched_with(addresses, network, "")
 }
 
-impl Pair {
-    fn launched() -> Self {
-        Self::launched_at(&addresses(), NETWORK)
+/// `stream`: further keys of the replica's stream.
+fn launched_with(addresses: &[String; 2], network: &str, stream: &str) -> Network {
+    let place = Place::new();
+    let config = config(&place, addresses, network);
+    if !stream.is_empty() {
+        let keys = format!("stream = {{ name = \"feeder.0/frame\"{stream} }}");
+        let text = std::fs::read_to_string(&config).unwrap().replace("stream = \"feeder.0/frame\"", &keys);
+        std::fs::write(&config, text).unwrap();
     }
-
-    pub(crate) fn launched_at(addresses: &[String; 2], network: &str) -> Self {
-        Self::launched_with(addresses, network, "")
+    if network.contains("keys") {
+        place.say(&["keys", "new", config.to_str().unwrap()]).ok();
     }
+    Network::new(place, config, None).launched(&["base", "brain"])
+}
 
-    /// `stream`: further keys of the replica's stream.
-    fn launched_with(addresses: &[String; 2], network: &str, stream: &str) -> Self {
-        let place = Place::new();
-        let config = config(&place, addresses, network);
-        if !stream.is_empty() {
-            let keys = format!("stream = {{ name = \"feeder.0/frame\"{stream} }}");
-            let text = std::fs::read_to_string(&config).unwrap().replace("stream = \"feeder.0/frame\"", &keys);
-            std::fs::write(&config, text).unwrap();
-        }
-        if network.contains("keys") {
-            place.say(&["keys", "new", config.to_str().unwrap()]).ok();
-        }
-        let start = |node: &str| {
-            let mut launch = Running::start(place.command(&["launch", config.to_str().unwrap(), "--node", node]));
-            let robot = place.robot(&config, node, &mut launch);
-            robot.wait_on(&mut launch);
-            (launch, robot)
-        };
-        let (base, brain) = (start("base"), start("brain"));
-        Self { place, config, base, brain }
-    }
-
-    pub(crate) fn say(&self, node: &str, arguments: &[&str]) -> String {
-        self.place.say_at(&self.config, node, arguments).ok()
-    }
-
-    /// Has the feeder write until its newest record is read on both nodes.
-    pub(crate) fn feed_through(&self, count: u64, [here, there]: [&mut Follower; 2]) {
-        self.say("base", &["call", "feeder.0", "feed", &count.to_string()]);
-        wait("the newest record is read on the other node", || {
-            here.follow();
-            there.follow();
-            let is_fed = self.say("base", &["call", "feeder.0", "--json", "fed"]).trim() != "null";
-            let newest = [&*here, &*there].map(|of| of.records.last_key_value().map(|(sequence, _)| *sequence));
-            if is_fed && newest[0].is_some() && newest[0] == newest[1] {
-                return Some(());
-            }
+/// Has the feeder write until its newest record is read on both nodes.
+pub(crate) fn feed_through(pair: &Network, count: u64, [here, there]: [&mut Follower; 2]) {
+    pair.says("base", &["call", "feeder.0", "feed", &count.to_string()]).ok();
+    until("the newest record is read on the other node", || {
+        here.follow();
+        there.follow();
+        let is_fed = pair.says("base", &["call", "feeder.0", "--json", "fed"]).ok().trim() != "null";
+        let newest = [&*here, &*there].map(|of| of.records.last_key_value().map(|(sequence, _)| *sequence));
+        let is_through = is_fed && newest[0].is_some() && newest[0] == newest[1];
+        if !is_through {
             // A busy computer may have dropped a part of the newest: the next one says so.
-            self.say("base", &["call", "feeder.0", "feed", "1"]);
-            None
-        });
-    }
-
-    /// Ends both; what they left stays.
-    pub(crate) fn stop(self) -> Place {
-        for (mut launch, robot) in [self.brain, self.base] {
-            drop(robot);
-            launch.stop();
+            pair.says("base", &["call", "feeder.0", "feed", "1"]).ok();
         }
-        self.place
-    }
+        is_through
+    });
 }
 
 /// Each record of the replica is as it was written, and none is missing without a word.
@@ -199,13 +147,11 @@ pub(crate) fn compare(here: &Follower, there: &Follower) {
 
 #[test]
 fn a_stream_of_another_node_is_read_as_if_written_here() {
-    let pair = Pair::launched();
-    let (mut here, mut there) = (Follower::new(&pair.base.1), Follower::new(&pair.brain.1));
-    pair.feed_through(60, [&mut here, &mut there]);
-    let feeder = pair.base.1.pid("feeder.0");
-    signal(feeder, Signal::SIGKILL);
-    pair.base.1.wait_restarted("feeder.0", feeder);
-    pair.feed_through(60, [&mut here, &mut there]);
+    let pair = launched_at(&addresses(), NETWORK);
+    let (mut here, mut there) = (Follower::new(pair.robot("base")), Follower::new(pair.robot("brain")));
+    feed_through(&pair, 60, [&mut here, &mut there]);
+    pair.robot("base").kill("feeder.0");
+    feed_through(&pair, 60, [&mut here, &mut there]);
 
     compare(&here, &there);
     let incarnations: std::collections::BTreeSet<u32> =
@@ -219,7 +165,7 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
     let info = stream(&["info", "feeder.0", "frame"]);
     assert!(info.contains("writer      the router, from node base\n"), "{info}");
     for (node, way) in [("base", "to brain"), ("brain", "from base")] {
-        let net = pair.say(node, &["net"]);
+        let net = pair.says(node, &["net"]).ok();
         let has_it = net.lines().any(|line| line.contains("feeder.0/frame") && line.contains(way));
         assert!(has_it, "{net}");
     }
@@ -228,7 +174,6 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
     let place = pair.stop();
     let recorded = values(&place.path("recordings/brain-0001.mcap"), "feeder.0/frame");
     assert!(recorded.len() > 60, "{} of the replica's records are recorded", recorded.len());
-    place.assert_empty();
 }
 
 /// Both nodes in namespaces, with these words for launch, until the recorder of one follows the replica of the other's
@@ -237,19 +182,10 @@ fn followed(place: &Place, network: &str, replica: &str, words: &[&str]) -> Opti
     let config = config(place, &["10.77.0.1".into(), "10.77.0.2".into()], network);
     // The file ends with the replica.
     std::fs::write(&config, std::fs::read_to_string(&config).unwrap() + replica).unwrap();
-    let launch = Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
-    // It ends at once where there are none.
-    let begun = wait("both nodes run", || {
-        let runs = ["base", "brain"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
-        if runs { Some(true) } else { launch.err().contains("cannot be made here").then_some(false) }
-    });
-    if !begun {
-        assert!(lacks_namespaces(&launch.err()));
-        return None;
-    }
-    wait("the recorder follows the replica", || {
+    let launch = launched_all(place, &config, &["base", "brain"], words)?;
+    until("the recorder follows the replica", || {
         feed(place, "feeder.0", 1);
-        (!recorded(place).is_empty()).then_some(())
+        !recorded(place).is_empty()
     });
     Some(launch)
 }
@@ -266,9 +202,9 @@ fn recorded(place: &Place) -> Vec<(u32, u64)> {
 /// missed: all that were written; and how many of them were lost on the way.
 fn feed_and_count(place: &Place, mut launch: Running, count: u64) -> (u64, u64, u64) {
     let target = feed(place, "feeder.0", count);
-    wait("records behind the last of them", || {
+    until("records behind the last of them", || {
         feed(place, "feeder.0", 1);
-        recorded(place).last().is_some_and(|(_, number)| *number > target).then_some(())
+        recorded(place).last().is_some_and(|(_, number)| *number > target)
     });
     let missed = told(place, &place.path("test.toml"));
     launch.stop();
@@ -291,28 +227,28 @@ fn told(place: &Place, config: &Path) -> Value {
 /// Both nodes on the loopback device, with these further keys of the replica's stream; how many of each cause a reader
 /// on the other node has missed that reads while so many are written, or after that, and what `stream info` says.
 fn missed(stream: &str, count: u64, is_slow: bool) -> (Missed, Value) {
-    let pair = Pair::launched_with(&addresses(), NETWORK, stream);
-    let mut there = Follower::new(&pair.brain.1);
+    let pair = launched_with(&addresses(), NETWORK, stream);
+    let mut there = Follower::new(pair.robot("brain"));
     let id = there.reader.id();
     let mut feed_until = |what: &str, written: u64, follow: bool| {
         wait(what, || {
-            pair.say("base", &["call", "feeder.0", "feed", "1"]);
+            pair.says("base", &["call", "feeder.0", "feed", "1"]).ok();
             if follow {
                 there.follow();
             }
-            let info = pair.brain.1.node.inspect_stream(id).unwrap();
+            let info = pair.robot("brain").node.inspect_stream(id).unwrap();
             info.map(|info| info.written).filter(|there| *there >= written)
         })
     };
     let first = feed_until("the replica begins", 1, true);
-    pair.say("base", &["call", "feeder.0", "feed", &count.to_string()]);
+    pair.says("base", &["call", "feeder.0", "feed", &count.to_string()]).ok();
     let newest = feed_until("the last one, or a newer one, is there", first + count, !is_slow);
     there.follow();
     assert_eq!(there.reader.missed().all(), there.reader.accounts().1, "each has a cause");
     assert!(there.reader.position() >= newest);
     let (missed, told) = (there.reader.missed(), told(&pair.place, &pair.config));
     drop(there);
-    pair.stop().assert_empty();
+    pair.stop();
     (missed, told)
 }
 
@@ -325,24 +261,23 @@ fn what_sampling_leaves_out_is_told_so() {
 
 #[test]
 fn what_sampling_leaves_out_is_not_recorded_as_lost() {
-    let pair = Pair::launched_with(&addresses(), NETWORK, ", every = 5");
+    let pair = launched_with(&addresses(), NETWORK, ", every = 5");
     let file = pair.place.path("recordings/brain-0001.mcap");
     let feed_beyond = |number: u64| {
-        wait(format!("records behind {number} are recorded"), || {
-            pair.say("base", &["call", "feeder.0", "feed", "1"]);
-            values(&file, "feeder.0/frame").last().is_some_and(|(_, newest)| *newest > number).then_some(())
+        until(format!("records behind {number} are recorded"), || {
+            pair.says("base", &["call", "feeder.0", "feed", "1"]).ok();
+            values(&file, "feeder.0/frame").last().is_some_and(|(_, newest)| *newest > number)
         });
     };
     feed_beyond(0);
-    pair.say("base", &["call", "feeder.0", "feed", "200"]);
+    pair.says("base", &["call", "feeder.0", "feed", "200"]).ok();
     feed_beyond(200);
-    let place = pair.stop();
+    let _place = pair.stop();
     let (recorded, told) = (values(&file, "feeder.0/frame"), info(&file).unwrap());
     let channel = told.channels.iter().find(|channel| channel.topic == "feeder.0/frame").unwrap();
     // The first one is sent whatever its number, so that the replica has one.
     let wanted = (recorded[recorded.len() - 1].1 - recorded[1].1) / 5 + 2;
     assert_eq!((recorded.len() as u64 + channel.lost, channel.losses.all()), (wanted, channel.lost), "{channel:?}");
-    place.assert_empty();
 }
 
 #[test]

@@ -3,14 +3,11 @@
 //!
 //! Only what was written and what came counts, not when: a busy computer passes records over, and says so.
 
-use crate::harness::{NETWORK, OUTPUT, Place, Robot, program, wait};
-use crate::lan::addresses;
-use crate::process::Running;
-use rohrpost::serde::Deserialize;
+use crate::harness::{NoSettings, OUTPUT, Place, Robot, head, program, run_if_launched, until, wait};
+use crate::network::{NETWORK, Network, addresses, at, nodes};
 use rohrpost::{Context, Module, ModuleError, Name, data};
 use rohrpost_mailbox::{Next, Participant, StreamId, StreamReader};
 use serde_json::Value;
-use std::path::PathBuf;
 use std::time::Duration;
 
 /// About 3000 datagrams.
@@ -26,19 +23,13 @@ const NUMBER: u16 = 2;
 /// Not a test: a module that launch starts. Run as a test it ends at once.
 #[test]
 fn camera() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Camera>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Camera>();
 }
 
 /// The same.
 #[test]
 fn localiser() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Localiser>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Localiser>();
 }
 
 /// Bytes as of a camera.
@@ -90,10 +81,6 @@ trait Localising {
     #[stream(2)]
     fn pose() -> [u64; 8];
 }
-
-#[derive(Deserialize, Default)]
-#[serde(crate = "rohrpost::serde", deny_unknown_fields, default)]
-struct NoSettings {}
 
 struct Camera {
     wanted: u64,
@@ -170,20 +157,7 @@ impl Localising for Localiser {
     }
 }
 
-pub(crate) const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-localiser = { id = 128 }
-camera = { id = 96 }
-output = { id = 32 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-"#;
+pub(crate) const CLASSES: &str = "router 250, localiser 128, camera 96, output 32, tool 16";
 
 const REPLICAS: &str = r#"
 [[replica]]
@@ -196,23 +170,15 @@ to = ["brain"]
 delay-alarm = "60 s"
 "#;
 
-fn config(place: &Place) -> PathBuf {
-    let config = place.path("test.toml");
-    let [base, brain] = addresses();
-    let nodes = format!(
-        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.brain]\naddress = \"{brain}\"\ntools = [16, 31]\n"
-    );
-    let module = |name: &str, stream: &str| {
-        let program = program(&format!("replicas_lossy::{name}"));
-        format!("[[module]]\nname = \"{name}.0\"\nnode = \"base\"\nprogram = {program}\n[module.stream.{stream}]\n")
+/// The table of a module of this file, with its stream.
+pub(crate) fn entry(name: &str, node: &str) -> String {
+    let (test, stream) = if name.starts_with("camera.") {
+        ("camera", "picture]\nrecord = \"5 MiB\"\nkeep = 4\nreaders = 2\n")
+    } else {
+        ("localiser", "pose]\nrecord = \"128 B\"\nkeep = 256\n")
     };
-    let modules = [
-        OUTPUT.replacen("[[module]]\n", "[[module]]\nnode = \"base\"\n", 1),
-        module("camera", "picture") + "record = \"5 MiB\"\nkeep = 4\nreaders = 2\n",
-        module("localiser", "pose") + "record = \"128 B\"\nkeep = 256\n",
-    ];
-    std::fs::write(&config, [HEAD, &nodes, NETWORK, &modules.concat(), REPLICAS].concat()).unwrap();
-    config
+    let program = program(&format!("replicas_lossy::{test}"));
+    format!("[[module]]\nname = \"{name}\"\nnode = \"{node}\"\nprogram = {program}\n[module.stream.{stream}")
 }
 
 /// Whether a record is as it was written.
@@ -266,32 +232,25 @@ pub(crate) fn is_pose(sequence: u64, body: &[u8]) -> bool {
 
 /// Two nodes on this computer, and readers of both replicas on the second.
 struct Trial {
-    place: Place,
-    config: PathBuf,
-    nodes: [(Running, Robot); 2],
+    network: Network,
     /// By stream: its module, how many records it was told to write, and a reader.
     streams: [(&'static str, u64, Follower); 2],
 }
 
 impl Trial {
-    fn launched(bad: &str) -> Self {
-        let place = Place::new();
-        let config = config(&place);
-        let nodes = ["base", "brain"].map(|node| {
-            let mut command = place.command(&["launch", config.to_str().unwrap(), "--node", node]);
-            command.env("ROHRPOST_IMPAIR", bad);
-            let mut launch = Running::start(command);
-            let robot = place.robot(&config, node, &mut launch);
-            robot.wait_on(&mut launch);
-            (launch, robot)
-        });
-        let follow = |module, is_right| (module, 0, Follower::new(&nodes[1].1, module, is_right));
+    fn launched(bad: &'static str) -> Self {
+        let (place, [base, brain]) = (Place::new(), addresses());
+        let nodes = nodes([("base", &base), ("brain", &brain)]);
+        let modules = [at("base", OUTPUT), entry("camera.0", "base"), entry("localiser.0", "base")].concat();
+        let config = place.write("test.toml", [&head(CLASSES), &nodes, NETWORK, &modules, REPLICAS].concat());
+        let network = Network::new(place, config, None).impaired(bad).launched(&["base", "brain"]);
+        let follow = |module, is_right| (module, 0, Follower::new(network.robot("brain"), module, is_right));
         let streams = [follow("camera.0", is_picture as Right), follow("localiser.0", is_pose)];
-        Self { place, config, nodes, streams }
+        Self { network, streams }
     }
 
     fn call(&self, words: &[&str]) -> String {
-        self.place.say_at(&self.config, "base", &[&["call"], words].concat()).ok()
+        self.network.says("base", &[&["call"], words].concat()).ok()
     }
 
     /// Has both written so many more, until the last of these, or a newer one, has come.
@@ -301,7 +260,7 @@ impl Trial {
             self.streams[at].1 += count;
         }
         let last = [0, 1].map(|at: usize| self.streams[at].1 - 1);
-        wait("the last of both has come", || {
+        until("the last of both has come", || {
             for (at, last) in last.into_iter().enumerate() {
                 self.streams.iter_mut().for_each(|(.., follower)| follower.follow());
                 let (module, _, ref follower) = self.streams[at];
@@ -312,14 +271,14 @@ impl Trial {
                 }
             }
             let has_come = |at: usize| self.streams[at].2.newest >= Some(last[at]);
-            (has_come(0) && has_come(1)).then_some(())
+            has_come(0) && has_come(1)
         });
     }
 
     /// What a router says of a replica on its side.
     fn state(&self, (router, node, side): (&str, &str, &str), stream: &str) -> Value {
         let echo = ["echo", router, "replicas", "--count", "1", "--json"];
-        let told = self.place.say_at(&self.config, node, &echo).json();
+        let told = self.network.says(node, &echo).json();
         let all = told["value"][side].as_array().unwrap_or_else(|| panic!("{told}"));
         all.iter().find(|state| state["stream"] == stream).unwrap_or_else(|| panic!("{told}")).clone()
     }
@@ -365,11 +324,6 @@ fn of_a_hundred_large_records_ninety_nine_are_whole_and_the_rest_is_told() {
             [(0, "again"), (1, "asked"), (1, "completed")].map(|(end, key)| count(&states[end], key));
         assert!(again > 0 && asked > 0 && completed > 0, "{states:?}");
     }
-    let Trial { place, nodes, streams, .. } = trial;
-    drop(streams);
-    for (mut launch, robot) in nodes {
-        drop(robot);
-        launch.stop();
-    }
-    place.assert_empty();
+    drop(trial.streams);
+    trial.network.stop();
 }

@@ -3,12 +3,10 @@
 //!
 //! How many come is for the line to say; what is compared is poses with pictures.
 
-use crate::harness::{Place, Robot, lab, program, wait};
-use crate::process::Running;
-use crate::replicas_lossy::{Follower, Right, is_picture, is_pose};
-use rohrpost_routers::lab::Lab;
+use crate::harness::{Place, head, lab, until, wait};
+use crate::network::Network;
+use crate::replicas_lossy::{Follower, Right, entry, is_picture, is_pose};
 use serde_json::Value;
-use std::path::PathBuf;
 
 /// A picture of 4 MiB takes more than a second, and a new one is taken each 150 ms.
 const NARROW: &str = "rate=3MiB,delay=5ms,seed=23";
@@ -19,20 +17,8 @@ const POSES: u64 = 1200;
 /// For each picture so many poses come at least: if they waited for pictures, there were hardly more of them.
 const POSES_A_PICTURE: u64 = 10;
 
+const CLASSES: &str = "router 250, localiser 128, camera 96, tcp 64, output 32, tool 16";
 const CONFIG: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-localiser = { id = 128 }
-camera = { id = 96 }
-tcp = { id = 64, text = "Carries packages beyond the LAN" }
-output = { id = 32, text = "Collects what modules say" }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
 [nodes.base]
 tools = [0, 15]
 [nodes.far]
@@ -58,13 +44,10 @@ delay-alarm = "60 s"
 "#;
 
 struct Laptop {
-    // Dropped in this order: readers, processes, what they left, their network.
+    // Dropped in this order.
     /// By stream: its node, its module, how many records it was told to write, and a reader on the other node.
     streams: [(&'static str, &'static str, u64, Follower); 3],
-    nodes: [(Running, Robot); 2],
-    place: Place,
-    config: PathBuf,
-    lab: Lab,
+    network: Network,
 }
 
 impl Laptop {
@@ -72,45 +55,26 @@ impl Laptop {
     fn launched() -> Option<Self> {
         let lab = lab(NODES, "replicas on a laptop")?;
         let place = Place::new();
-        let config = place.path("robot.toml");
-        let module = |(name, node, stream): (&str, &str, &str)| {
-            let class = name.split('.').next().unwrap();
-            let program = program(&format!("replicas_lossy::{class}"));
-            format!("[[module]]\nname = \"{name}\"\nnode = \"{node}\"\nprogram = {program}\n[module.stream.{stream}]\n")
-        };
-        let modules = [
-            module(("camera.0", "base", "picture")) + "record = \"5 MiB\"\nkeep = 4\nreaders = 2\n",
-            module(("localiser.0", "base", "pose")) + "record = \"128 B\"\nkeep = 256\n",
-            module(("localiser.1", "far", "pose")) + "record = \"128 B\"\nkeep = 256\n",
-        ];
-        std::fs::write(&config, format!("{CONFIG}{}", modules.concat())).unwrap();
+        let modules = [("camera.0", "base"), ("localiser.0", "base"), ("localiser.1", "far")];
+        let modules = modules.map(|(name, node)| entry(name, node)).concat();
+        let config = place.write("robot.toml", [&head(CLASSES), CONFIG, &modules].concat());
         place.say(&["keys", "new", config.to_str().unwrap()]).ok();
-        let nodes = NODES.map(|(node, _)| {
-            let mut command = place.command(&["launch", config.to_str().unwrap(), "--node", node]);
-            command.env("ROHRPOST_IMPAIR", NARROW);
-            let mut launch = {
-                let _inside = lab.enter(node).unwrap();
-                Running::start(command)
-            };
-            let robot = place.robot(&config, node, &mut launch);
-            robot.wait_on(&mut launch);
-            (launch, robot)
-        });
+        let network = Network::new(place, config, Some(lab)).impaired(NARROW).launched(&["base", "far"]);
         let follow =
-            |node, at: usize, module, is_right| (node, module, 0, Follower::new(&nodes[at].1, module, is_right));
+            |node, reader, module, is_right| (node, module, 0, Follower::new(network.robot(reader), module, is_right));
         let streams = [
-            follow("base", 1, "camera.0", is_picture as Right),
-            follow("base", 1, "localiser.0", is_pose),
-            follow("far", 0, "localiser.1", is_pose),
+            follow("base", "far", "camera.0", is_picture as Right),
+            follow("base", "far", "localiser.0", is_pose),
+            follow("far", "base", "localiser.1", is_pose),
         ];
-        Some(Self { streams, nodes, place, config, lab })
+        Some(Self { streams, network })
     }
 
     /// Has a module write so many more.
     fn feed(&mut self, at: usize, count: u64) {
         let (node, module, ref mut fed, _) = self.streams[at];
         *fed += count;
-        self.place.say_at(&self.config, node, &["call", module, "feed", &count.to_string()]).ok();
+        self.network.says(node, &["call", module, "feed", &count.to_string()]).ok();
     }
 
     /// Has all write so many more, until the last of these has come.
@@ -121,34 +85,22 @@ impl Laptop {
 
     /// Until the last of all has come: it waits where it was written until it may leave.
     fn wait_for_all(&mut self) {
-        wait("the last of all has come", || {
+        until("the last of all has come", || {
             self.streams.iter_mut().for_each(|(.., follower)| follower.follow());
             let has_come = |(_, _, fed, follower): &(_, _, u64, Follower)| follower.newest == Some(fed - 1);
-            self.streams.iter().all(has_come).then_some(())
+            self.streams.iter().all(has_come)
         });
-    }
-
-    fn net(&self, node: &str) -> Value {
-        let said = self.place.say_at(&self.config, node, &["net", "--json"]);
-        let told: Value = serde_json::from_str(said.out.trim()).unwrap_or_default();
-        told.as_array().and_then(|all| all.iter().find(|told| told["node"] == node)).cloned().unwrap_or_default()
     }
 
     /// What an end says of a replica.
     fn state(&self, node: &str, side: &str, stream: &str) -> Option<Value> {
-        let net = self.net(node);
+        let net = self.network.net(node);
         net["replicas"][side].as_array()?.iter().find(|state| state["stream"] == stream).cloned()
     }
 
     fn stop(self) {
-        let Self { streams, nodes, place, lab, .. } = self;
-        drop(streams);
-        for (mut launch, robot) in nodes.into_iter().rev() {
-            drop(robot);
-            launch.stop();
-        }
-        place.assert_empty();
-        drop(lab);
+        drop(self.streams);
+        self.network.stop();
     }
 }
 
@@ -176,16 +128,16 @@ fn a_laptop_has_whole_pictures_and_fresh_poses_by_a_line_that_is_too_narrow_and_
         assert_eq!((&sent["node"], &came["node"]), (&to.into(), &from.into()), "{sent} {came}");
         assert_eq!(came["records"], records, "each record that came was read: {came}");
     }
-    let list = ["stream", "list", "--config", laptop.config.to_str().unwrap(), "--node", "far"];
-    let listed = laptop.place.say(&list).ok();
+    let list = ["stream", "list", "--config", laptop.network.config.to_str().unwrap(), "--node", "far"];
+    let listed = laptop.network.place.say(&list).ok();
     let from_base = |line: &str| line.starts_with("camera.0") && line.contains("from node base");
     assert!(listed.lines().any(from_base), "{listed}");
 
     laptop.feed(0, PICTURES);
-    laptop.lab.cut("far").unwrap();
-    wait("far is away", || (laptop.net("far")["beyond"]["state"] == "away").then_some(()));
+    laptop.network.lab().cut("far").unwrap();
+    until("far is away", || laptop.network.net("far")["beyond"]["state"] == "away");
     laptop.feed(1, 100);
-    laptop.lab.fix("far").unwrap();
+    laptop.network.lab().fix("far").unwrap();
     laptop.wait_for_all();
     laptop.write([1, 100, 100]);
     let told: Vec<[u64; 2]> = laptop.streams.iter().map(|(.., follower)| follower.told()).collect();

@@ -1,6 +1,6 @@
 //! Modules that end, and what launch does then.
 
-use crate::harness::{OUTPUT, Place, halt, probe, signal, wait};
+use crate::harness::{OUTPUT, Place, halt, probe, signal, until};
 use crate::output::lines;
 use nix::sys::signal::Signal;
 use std::time::{Duration, Instant};
@@ -15,9 +15,8 @@ fn policies_say_after_which_end_a_module_starts_again() {
         ("always", 0, true),
         ("always", 3, true),
     ] {
-        let place = Place::new();
         let restart = format!("restart = {{ policy = \"{policy}\", backoff = \"50 ms\" }}");
-        let (mut launch, robot) = place.launched(&[&probe("probe.0", "", &restart)]);
+        let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", &restart)]);
         let pid = robot.pid("probe.0");
         place.say(&["call", "probe.0", "leave", &code.to_string()]).ok();
         launch.wait_for(&format!("probe.0 ended with {code}"));
@@ -37,8 +36,7 @@ fn policies_say_after_which_end_a_module_starts_again() {
 
 #[test]
 fn a_killed_module_works_again_and_its_restarts_are_counted() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let mut pid = robot.pid("probe.0");
     for count in 1..=2 {
         signal(pid, Signal::SIGKILL);
@@ -56,9 +54,8 @@ fn a_killed_module_works_again_and_its_restarts_are_counted() {
 
 #[test]
 fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
-    let place = Place::new();
     let restart = "restart = { policy = \"always\", backoff = \"100 ms\", at-most = 3, within = \"60 s\" }";
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", restart), &probe("probe.1", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", restart), &probe("probe.1", "", "")]);
     let mut pid = robot.pid("probe.0");
     for pause in ["100ms", "200ms", "400ms"] {
         let killed = Instant::now();
@@ -71,8 +68,8 @@ fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
     signal(pid, Signal::SIGKILL);
     launch.wait_for("probe.0 was killed by signal 9; given up after 3 restarts within 60s");
     assert_eq!(robot.state("probe.1"), "on", "the others go on");
-    wait("its mailboxes are gone", || {
-        (robot.node.mailboxes().unwrap().iter().all(|n| n.module() != robot.name("probe.0"))).then_some(())
+    until("its mailboxes are gone", || {
+        robot.node.mailboxes().unwrap().iter().all(|n| n.module() != robot.name("probe.0"))
     });
     let told = place.say(&["call", "probe.0", "count", "1"]).fails();
     assert!(
@@ -81,8 +78,7 @@ fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
     );
     let status = place.say(&["status"]);
     assert_eq!(status.code, Some(1), "one does not answer: {}", status.out);
-    launch.signal(Signal::SIGINT);
-    assert_eq!(launch.end().code(), Some(1));
+    launch.stop_failed();
     assert!(launch.err().contains("probe.0 failed for good: was killed by signal 9; given up"), "{}", launch.err());
     assert_eq!(place.recorded("start"), 5);
     place.assert_empty();
@@ -90,13 +86,10 @@ fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
 
 #[test]
 fn a_stopped_module_does_not_keep_its_launch_from_watching_others() {
-    let place = Place::new();
-    let (mut launch, robot) =
-        place.launched(&[&probe("probe.0", "", "stop-within = \"200 ms\""), &probe("probe.1", "", "")]);
+    let (place, mut launch, robot) =
+        Place::running(&[&probe("probe.0", "", "stop-within = \"200 ms\""), &probe("probe.1", "", "")]);
     halt(robot.pid("probe.0"));
-    let pid = robot.pid("probe.1");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("probe.1", pid);
+    robot.kill("probe.1");
     let status = place.say(&["status", "--timeout", "0.3"]);
     assert_eq!(status.code, Some(1));
     let silent = status.out.lines().find(|line| line.starts_with("probe.0")).unwrap();
@@ -106,12 +99,10 @@ fn a_stopped_module_does_not_keep_its_launch_from_watching_others() {
 
 #[test]
 fn launch_stops_while_a_module_waits_to_be_started_again() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = { backoff = \"10 min\" }")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.0", "", "restart = { backoff = \"10 min\" }")]);
     signal(robot.pid("probe.0"), Signal::SIGKILL);
     launch.wait_for("starts again in 600s");
-    wait("probe.0 is gone", || robot.process("probe.0").is_none().then_some(()));
-    drop(robot);
+    until("probe.0 is gone", || robot.process("probe.0").is_none());
     launch.stop();
     assert_eq!(place.recorded("start"), 1);
     place.assert_empty();
@@ -129,16 +120,15 @@ fn a_module_that_ends_again_and_again_floods_neither_the_terminal_nor_the_log() 
         let restart = "restart = { policy = \"always\", backoff = \"1 ms\", at-most = 1000, within = \"50 ms\" }";
         let config = place.config(&[OUTPUT, &probe("probe.0", settings, restart), &probe("probe.1", "", "")]);
         let mut launch = place.launch(&config);
-        let robot = place.robot(&config, "main", &mut launch);
+        let _robot = place.robot(&config, "main", &mut launch);
         for starts in 1..=42 {
-            wait("it ends again and again", || (place.recorded("start") >= starts).then_some(()));
+            until("it ends again and again", || place.recorded("start") >= starts);
         }
-        wait("the list says that it is started again", || {
+        until("the list says that it is started again", || {
             let list = place.say(&["list"]).out;
-            list.lines().any(|line| line.starts_with("probe.0") && line.contains("restarting (")).then_some(())
+            list.lines().any(|line| line.starts_with("probe.0") && line.contains("restarting ("))
         });
         let log = lines(&place, "probe.0");
-        drop(robot);
         let out = launch.stop();
         let ends = place.recorded("start");
         assert!(ends < 160, "{ends} ends, of which the last that is told is the eightieth at most");

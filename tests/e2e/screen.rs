@@ -1,6 +1,6 @@
 //! The live table, in a terminal of its own.
 
-use crate::harness::{OUTPUT, Place, probe, runs, simulated, wait};
+use crate::harness::{OUTPUT, Place, probe, runs, simulated, until};
 use crate::terminal::Terminal;
 use crate::tools::{at_a_node, commands};
 use nix::sys::signal::Signal;
@@ -19,16 +19,14 @@ fn a_terminal_shows_a_live_table() {
     for (rows, columns) in [(1, 1), (3, 10), (200, 500), (24, 80)] {
         terminal.resize(&launch, rows, columns);
         let before = terminal.drawn().len();
-        wait("it is drawn again", || (terminal.drawn().len() > before + 200).then_some(()));
+        until("it is drawn again", || terminal.drawn().len() > before + 200);
     }
     let robot = place.robot(&config, "main", &mut launch);
     let pid = robot.pid("probe.0");
     crate::harness::signal(pid, Signal::SIGKILL);
     terminal.wait_for("probe.0 was killed by signal 9; starts again in");
     robot.wait_restarted("probe.0", pid);
-    drop(robot);
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success(), "{}", terminal.drawn());
+    launch.stop();
     assert!(!terminal.drawn().contains("panicked"), "{}", terminal.drawn());
     place.assert_empty();
 }
@@ -48,17 +46,14 @@ fn a_closed_terminal_hurts_nobody() {
     crate::harness::signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.0", pid);
     let pid = robot.pid("probe.0");
-    drop(robot);
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success());
+    launch.stop();
     assert!(!runs(pid));
     place.assert_empty();
 }
 
 #[test]
 fn what_does_not_go_to_a_terminal_holds_no_table() {
-    let place = Place::new();
-    let (mut launch, _robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (_place, mut launch, _robot) = Place::running(&[&probe("probe.0", "", "")]);
     assert_eq!(launch.stop(), "node main of test runs: 1 module\n", "nothing else happened");
 }
 
@@ -72,8 +67,7 @@ fn a_live_table_has_all_columns_and_all_names_in_eighty_columns() {
         assert!(screen.split_whitespace().any(|word| word == head), "no {head}:\n{screen}");
     }
     assert!(!screen.contains('\\'), "{screen}");
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success());
+    launch.stop();
 }
 
 #[test]
@@ -88,14 +82,12 @@ fn what_modules_say_stands_below_the_live_table_which_keeps_its_place() {
     let screen = terminal.wait_screen("the last line", is_last);
     let first = screen.lines().next().unwrap_or_default();
     assert!(first.starts_with("test, ") && screen.contains("probe.0"), "the table has moved:\n{screen}");
-    launch.signal(Signal::SIGINT);
-    assert!(launch.end().success());
+    launch.stop();
 }
 
 #[test]
 fn every_tool_fits_a_terminal_of_eighty_columns() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&simulated(), OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);
+    let (place, mut launch, robot) = Place::running(&[&simulated(), OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);
     robot.wait_on(&mut launch);
     let asked = "call probe.0 count 1|list -m -s|stream list|stream info camera.0 image|param list|param get motor.0|\
                  mailbox motor.0.0|delay motor.0 --count 1|hz motor.0 --count 1|graph --seconds 0.2|doctor|\

@@ -2,7 +2,7 @@
 //!
 //! It is this test program itself, as `probe` is.
 
-use crate::harness::program;
+use crate::harness::{program, run_if_launched};
 use rohrpost::schema::Bytes;
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Interest, Module, ModuleClock, ModuleError, Ready, Received, Stream, StreamSubscription};
@@ -38,10 +38,7 @@ pub(crate) fn entry(number: usize, source: &str) -> String {
 /// Not a test: a module that launch starts, or an exact replay. Run as a test it ends at once.
 #[test]
 fn module() {
-    if ["ROHRPOST_MODULE", "ROHRPOST_EXACT"].iter().any(|variable| std::env::var_os(variable).is_some()) {
-        let code = rohrpost::run::<Seer>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Seer>();
 }
 
 /// Says what it sees.

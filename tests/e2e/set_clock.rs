@@ -1,7 +1,7 @@
 //! A computer that starts in 1970, as one without a battery does. Its clock is set while a node runs, and set back.
 
-use crate::harness::{NETWORK, OUTPUT, Place, Robot, probe, wait};
-use crate::lan::addresses;
+use crate::harness::{OUTPUT, Place, Robot, probe, until, wait};
+use crate::network::{NETWORK, addresses, at, nodes};
 use crate::process::{Running, Said};
 use rohrpost_mailbox::{SystemClock, realtime_ns};
 use std::fs::OpenOptions;
@@ -57,10 +57,7 @@ impl Computer {
     fn launched(&self, time: &str) -> (Running, Robot) {
         let nodes = format!("[nodes.main]\n{time}");
         let config = self.place.config_of("test", &nodes, &[OUTPUT, &probe("probe.0", "", "")]);
-        let mut launch = Running::start(self.command(&["launch", "--quiet", config.to_str().unwrap()]));
-        let robot = self.place.robot(&config, "main", &mut launch);
-        robot.wait_on(&mut launch);
-        (launch, robot)
+        self.place.up(self.command(&["launch", "--quiet", config.to_str().unwrap()]), &config, "main")
     }
 }
 
@@ -78,17 +75,15 @@ fn a_node_that_began_in_1970_says_so_when_the_clock_is_set_and_goes_on_when_it_i
     assert!(quiet.contains("own") && !quiet.contains("days"), "{quiet}");
     computer.set(0);
     let ahead = " days ahead of system time";
-    wait("launch says so", || launch.out().contains(ahead).then_some(()));
-    wait("the log says so", || computer.say(&["log"]).out.contains(ahead).then_some(()));
+    until("launch says so", || launch.out().contains(ahead));
+    until("the log says so", || computer.say(&["log"]).out.contains(ahead));
     for arguments in [&["time"][..], &["top", "--once"], &["doctor"]] {
         let said = computer.say(arguments).out;
         assert!(said.contains(ahead), "{arguments:?}: {said}");
     }
-    let json = computer.say(&["time", "--json"]).ok();
-    assert!(json.contains("\"clock_set_by_ns\":"), "{json}");
+    computer.say(&["time", "--json"]).ok_with(["\"clock_set_by_ns\":"]);
     assert_eq!(clock.now().epoch, 1, "nothing changes unasked");
-    let begun = computer.say(&["time", "--new-epoch"]).ok();
-    assert!(begun.contains("epoch 2 of time: 20"), "{begun}");
+    computer.say(&["time", "--new-epoch"]).ok_with(["epoch 2 of time: 20"]);
     let now = clock.now();
     assert!(now.epoch == 2 && now.ns.abs_diff(realtime_ns()) < 60_000_000_000, "{now:?}");
     for arguments in [&["time"][..], &["top", "--once"], &["doctor"]] {
@@ -97,8 +92,7 @@ fn a_node_that_began_in_1970_says_so_when_the_clock_is_set_and_goes_on_when_it_i
     }
     // Set back, as by a battery that is empty.
     computer.set(-400 * DAY_S);
-    wait("launch says that it is behind", || launch.out().contains("400 days behind system time").then_some(()));
-    drop(robot);
+    until("launch says that it is behind", || launch.out().contains("400 days behind system time"));
     launch.stop();
     computer.place.assert_empty();
 }
@@ -110,9 +104,8 @@ fn a_node_that_follows_its_clock_begins_an_epoch_when_that_is_set() {
     let clock = SystemClock::open(&robot.node);
     assert_eq!(clock.now().epoch, 1);
     computer.set(0);
-    wait("the epoch", || (clock.now().epoch == 2).then_some(()));
+    until("the epoch", || clock.now().epoch == 2);
     assert!(clock.now().ns.abs_diff(realtime_ns()) < 60_000_000_000, "{:?}", clock.now());
-    drop(robot);
     launch.stop();
     computer.place.assert_empty();
 }
@@ -123,18 +116,11 @@ fn nodes_follow_a_master_that_begins_an_epoch_when_it_is_asked_from_anywhere_or_
     for when_set in ["tell", "new-epoch"] {
         let computer = Computer::at(60);
         let [base, arm] = addresses();
-        let nodes = format!(
-            "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n\
-             {NETWORK}when-set = \"{when_set}\"\n"
-        );
-        let output = OUTPUT.replacen("[[module]]\n", "[[module]]\nnode = \"arm\"\n", 1);
-        let config = computer.place.config_of("test", &nodes, &[&output]);
+        let nodes = nodes([("base", &base), ("arm", &arm)]) + NETWORK + &format!("when-set = \"{when_set}\"\n");
+        let config = computer.place.config_of("test", &nodes, &[&at("arm", OUTPUT)]);
         let mut launches = ["base", "arm"].map(|node| {
             let file = config.to_str().unwrap();
-            let mut launch = Running::start(computer.command(&["launch", "--quiet", file, "--node", node]));
-            let robot = computer.place.robot(&config, node, &mut launch);
-            robot.wait_on(&mut launch);
-            (launch, robot)
+            computer.place.up(computer.command(&["launch", "--quiet", file, "--node", node]), &config, node)
         });
         let clocks = [0, 1].map(|node: usize| SystemClock::open(&launches[node].1.node));
         let all_know = |in_1970: bool| {
@@ -148,11 +134,10 @@ fn nodes_follow_a_master_that_begins_an_epoch_when_it_is_asked_from_anywhere_or_
         computer.set(0);
         if when_set == "tell" {
             let ahead = || computer.say(&["time", "--config", config.to_str().unwrap()]).out.contains(" days ahead of");
-            wait("time says so", || ahead().then_some(()));
+            until("time says so", || ahead());
             assert_eq!(all_know(true), Some(before), "nothing changes unasked");
             let words = ["time", "--config", config.to_str().unwrap(), "--node", "arm", "--new-epoch"];
-            let begun = computer.say(&words).ok();
-            assert!(begun.contains(" of time: 20"), "{begun}");
+            computer.say(&words).ok_with([" of time: 20"]);
         }
         let after = wait("both have the new time", || all_know(false));
         assert!(after[0] == after[1] && after[0] > before[0], "{before:?}, then {after:?}");

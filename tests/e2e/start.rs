@@ -1,7 +1,6 @@
 //! What keeps a node from starting, and what is said about it.
 
-use crate::harness::{OUTPUT, Place, probe, wait};
-use nix::sys::signal::Signal;
+use crate::harness::{OUTPUT, Place, assert_has, probe, until};
 
 #[test]
 fn a_module_that_does_not_start_is_named_and_nothing_is_left() {
@@ -29,8 +28,8 @@ fn a_module_that_does_not_start_is_named_and_nothing_is_left() {
 
 #[test]
 fn a_slow_module_is_waited_for() {
-    let place = Place::new();
-    let (mut launch, _robot) = place.launched(&[&probe("probe.0", "slow-ms = 1500", ""), &probe("probe.1", "", "")]);
+    let (place, mut launch, _robot) =
+        Place::running(&[&probe("probe.0", "slow-ms = 1500", ""), &probe("probe.1", "", "")]);
     assert!(place.record().starts_with(&["probe.0 start".into(), "probe.1 start".into(), "probe.0 on".into()]));
     launch.stop();
 }
@@ -41,30 +40,25 @@ fn launch_can_be_stopped_while_modules_start() {
     let slow = probe("probe.1", "slow-ms = 600000", "ready-within = \"20 min\"\nstop-within = \"200 ms\"");
     let config = place.config(&[&probe("probe.0", "", ""), &slow]);
     let mut launch = place.launch(&config);
-    wait("probe.1 starts", || (place.recorded("start") == 2).then_some(()));
-    launch.signal(Signal::SIGINT);
-    assert_eq!(launch.end().code(), Some(1));
+    until("probe.1 starts", || place.recorded("start") == 2);
+    launch.stop_failed();
     assert!(launch.err().contains("probe.1 did not become ready: told to stop"), "{}", launch.err());
     place.assert_empty();
 }
 
 #[test]
 fn a_module_that_does_not_switch_on_is_in_error_and_the_others_work() {
-    let place = Place::new();
-    let config = place.config(&[&probe("probe.0", "refuse-on = true", ""), &probe("probe.1", "", "")]);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    wait("probe.1 is on", || (robot.state("probe.1") == "on").then_some(()));
+    let (place, mut launch, robot) =
+        Place::begun(&[&probe("probe.0", "refuse-on = true", ""), &probe("probe.1", "", "")]);
+    until("probe.1 is on", || robot.state("probe.1") == "on");
     launch.wait_for("probe.0 could not be switched on: ");
     assert!(launch.out().contains("a probe was asked not to work"), "{}", launch.out());
     let status = place.say(&["status"]);
     assert_eq!(status.code, Some(1), "somebody is in error");
     assert!(status.out.contains("error") && status.out.contains("a probe was asked not to work"), "{}", status.out);
-    let refused = place.say(&["call", "probe.0", "count", "1"]).fails();
-    assert!(refused.contains("a probe was asked not to work"), "{refused}");
+    place.say(&["call", "probe.0", "count", "1"]).fails_with(["a probe was asked not to work"]);
     place.say(&["status", "probe.1"]).ok();
-    launch.signal(Signal::SIGINT);
-    assert_eq!(launch.end().code(), Some(1), "somebody is in error");
+    launch.stop_failed();
     assert!(launch.err().contains("probe.0 is in error: a probe was asked not to work"), "{}", launch.err());
 }
 
@@ -89,12 +83,9 @@ fn a_missing_program_is_told_before_anything_starts() {
 
 #[test]
 fn an_optional_module_is_left_out_with_a_notice() {
-    let place = Place::new();
     let missing = "[[module]]\nname = \"probe.1\"\nprogram = \"rohrpost-nowhere\"\noptional = true\n";
-    let config = place.config(&[&probe("probe.0", "", ""), missing, OUTPUT]);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    wait("output.0 is on", || (robot.state("output.0") == "on").then_some(()));
+    let (place, mut launch, robot) = Place::begun(&[&probe("probe.0", "", ""), missing, OUTPUT]);
+    until("output.0 is on", || robot.state("output.0") == "on");
     launch.wait_for("the module is left out, since it is optional");
     let out = launch.stop();
     assert!(out.contains("module `probe.1`: `rohrpost-nowhere` is neither in"), "{out}");
@@ -107,11 +98,9 @@ fn a_broken_configuration_starts_nothing() {
     let config = place.config(&[&probe("probe.0", "", "calls = [\"probe.9\"]")]);
     let file = config.to_str().unwrap();
     for arguments in [&["launch", file][..], &["check", file], &["list", "--config", file]] {
-        let told = place.say(arguments).fails();
-        assert!(told.contains("test.toml:1") && told.contains("probe.9"), "{arguments:?}: {told}");
+        place.say(arguments).fails_with(["test.toml:1", "probe.9"]);
     }
-    let told = place.say(&["launch", "nowhere.toml"]).fails();
-    assert!(told.contains("nowhere.toml"), "{told}");
+    place.say(&["launch", "nowhere.toml"]).fails_with(["nowhere.toml"]);
     place.assert_empty();
 }
 
@@ -120,22 +109,17 @@ fn check_explains_good_files_and_places_the_mistakes_of_bad_ones() {
     let place = Place::new();
     for file in ["demo.toml", "demo-log.toml"] {
         let path = format!("{}/../config/{file}", env!("CARGO_MANIFEST_DIR"));
-        let said = place.say(&["check", &path]).ok();
-        assert!(said.contains("mapper.0") && said.contains("laser.0"), "{said}");
+        place.say(&["check", &path]).ok_with(["mapper.0", "laser.0"]);
     }
     let config = place.config(&[OUTPUT, "[[module]]\nname = \"probe.1\"\nprogram = \"nowhere\"\n"]);
     let said = place.say(&["check", config.to_str().unwrap()]).ok();
     assert!(said.contains("note: ") && said.contains("`nowhere`"), "another computer may have it: {said}");
-    let wrong = place.say(&["check", config.to_str().unwrap(), "--node", "other"]).fails();
-    assert!(wrong.contains("main"), "{wrong}");
+    place.say(&["check", config.to_str().unwrap(), "--node", "other"]).fails_with(["main"]);
     let text = "installation = \"broken\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nlaser = { id = 500 }\n\
                 tool = { id = 16 }\n[nodes.main]\n[[module]]\nname = \"laser.0\"\nbuiltin = \"smi\"\n";
-    let broken = place.path("broken.toml");
-    std::fs::write(&broken, text).unwrap();
+    let broken = place.write("broken.toml", text);
     let told = place.say(&["check", broken.to_str().unwrap()]).fails();
-    for words in ["broken.toml:6: ", "broken.toml:11: ", "did you mean `sim`?"] {
-        assert!(told.contains(words), "no `{words}` in: {told}");
-    }
+    assert_has(&told, ["broken.toml:6: ", "broken.toml:11: ", "did you mean `sim`?"]);
 }
 
 #[test]

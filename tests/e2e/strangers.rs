@@ -1,7 +1,7 @@
 //! Launch ends what a launch has started, and nobody else: not in another pid namespace, not by its number alone.
 
 use crate::all_nodes::below;
-use crate::harness::{OUTPUT, Place, Robot, probe, runs, signal, wait};
+use crate::harness::{OUTPUT, Place, Robot, probe, runs, signal, until, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::{Node, ParticipantInfo};
@@ -58,7 +58,7 @@ fn a_launch_ends_nobody_in_another_container_and_nobody_here_with_the_same_numbe
     let listed = place.say(&["list", "--json"]).json();
     assert_eq!(listed["modules"][0]["scheduling"], "-", "{listed}");
     named(&first, "rohrpost").iter().for_each(|launch| signal(*launch, Signal::SIGKILL));
-    wait("its launch is dead", || robot.node.launcher().is_none().then_some(()));
+    until("its launch is dead", || robot.node.launcher().is_none());
     // In the second container each number up to the module's is that of a process that has nothing to do with it.
     let number = before.unwrap().0;
     let script = format!("n=0; while [ $n -lt {number} ]; do sleep 600 & n=$!; done; \"$@\"; echo ended with $?; wait");
@@ -66,21 +66,18 @@ fn a_launch_ends_nobody_in_another_container_and_nobody_here_with_the_same_numbe
     second.wait_for("ended with 1");
     let told = format!("probe.0 runs already, as process {number}; launch ends only what a launch has started");
     let why = "it runs in another one, such as a container";
-    wait("it says why", || (second.err().contains(&told) && second.err().contains(why)).then_some(()));
+    until("it says why", || second.err().contains(&told) && second.err().contains(why));
     // All but the shell, which is the first.
     let bystanders = || named(&second, "sleep").into_iter().filter(|pid| runs(*pid)).count();
-    wait(format!("{number} less one bystanders live"), || (bystanders() == number as usize - 1).then_some(()));
+    until(format!("{number} less one bystanders live"), || bystanders() == number as usize - 1);
     // From outside the number means yet another process.
-    let told = place.say(&["launch", config.to_str().unwrap()]).fails();
-    assert!(told.contains(why), "{told}");
+    place.say(&["launch", config.to_str().unwrap()]).fails_with([why]);
     assert_eq!(use_of(&robot, "probe.0"), before, "it runs on");
     drop((first, second));
-    wait("it has ended with its container", || robot.process("probe.0").is_none().then_some(()));
+    until("it has ended with its container", || robot.process("probe.0").is_none());
     let mut launch = place.launch(&config);
     place.robot(&config, "main", &mut launch).wait_on(&mut launch);
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
@@ -90,7 +87,7 @@ fn the_last_word_of_a_dead_module_is_not_that_of_a_new_one_with_the_same_number(
     let Some(mut first) = contained(&place, "exec \"$@\"", &config) else { return };
     let robot = launched_in(&mut first, &place, &config);
     drop(first);
-    wait("all in it have ended", || robot.node.participants().is_empty().then_some(()));
+    until("all in it have ended", || robot.node.participants().is_empty());
     let keys = "ready-within = \"500 ms\"\nrestart = \"never\"\nrequired = true";
     let config = place.config(&[&probe("probe.0", "hang-at-start = true", keys)]);
     let mut second = contained(&place, "exec \"$@\"", &config).unwrap();
@@ -103,10 +100,10 @@ fn a_module_that_was_started_by_hand_is_left_alone_and_named() {
     let place = Place::new();
     let config = place.config(&[OUTPUT, &probe("probe.0", "", "")]);
     let file = config.to_str().unwrap();
-    let mut by_hand = Running::start(place.command(&["run", "output", "--config", file, "--name", "output.0"]));
+    let mut by_hand = place.start(&["run", "output", "--config", file, "--name", "output.0"]);
     let pid = by_hand.pid();
     let node = wait("the node", || Node::open(&place.memory().join("test.main")).ok());
-    wait("it is there", || node.participants().iter().any(|there| there.pid == pid).then_some(()));
+    until("it is there", || node.participants().iter().any(|there| there.pid == pid));
     let told = place.say(&["launch", file]).fails();
     let why = format!("output.0 runs already, as process {pid}; launch ends only what a launch has started");
     assert!(told.contains(&why) && told.contains(&format!("by hand: end it (kill {pid})")), "{told}");
@@ -115,6 +112,5 @@ fn a_module_that_was_started_by_hand_is_left_alone_and_named() {
     drop(node);
     let mut launch = place.launch(&config);
     place.robot(&config, "main", &mut launch).wait_on(&mut launch);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

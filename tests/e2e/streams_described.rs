@@ -2,10 +2,10 @@
 //! at a time.
 
 use crate::completions::offered;
-use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, program, wait};
+use crate::conforming::unhex;
+use crate::harness::{NoSettings, OUTPUT, Place, RECORDED_CLASSES, Robot, classes, program, run_if_launched, wait};
 use crate::process::{Running, Said};
 use rohrpost::interfaces::WheelsInterface;
-use rohrpost::serde::Deserialize;
 use rohrpost::types::Odometry;
 use rohrpost::{Context, Module, ModuleError, Stream};
 use serde_json::Value;
@@ -14,10 +14,7 @@ use std::f64::consts::{PI, TAU};
 /// Not a test: a module that launch starts. Run as a test it ends at once.
 #[test]
 fn reader() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Reader>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<Reader>();
 }
 
 /// Reads odometry as modules do.
@@ -28,19 +25,15 @@ trait Reading {
     fn odometry_at(&mut self, stamp_ns: u64) -> Result<Odometry, String>;
 }
 
-#[derive(Deserialize, Default)]
-#[serde(crate = "rohrpost::serde", deny_unknown_fields, default)]
-struct ReaderSettings {}
-
 struct Reader {
     odometry: Stream<Odometry>,
 }
 
 impl Module for Reader {
-    type Settings = ReaderSettings;
+    type Settings = NoSettings;
     type Interfaces = ReadingInterface;
 
-    fn new(_: ReaderSettings, context: &mut Context) -> Result<Self, ModuleError> {
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         Ok(Self { odometry: context.stream(WheelsInterface::ODOMETRY, "odometry.0")? })
     }
 }
@@ -54,12 +47,6 @@ impl Reading for Reader {
 
 /// A robot that drives about, and a module that reads its odometry.
 const ROBOT: &str = r#"
-[classes.camera]
-id = 112
-[classes.depth]
-id = 104
-[classes.reader]
-id = 94
 [[module]]
 name = "motor.0"
 aliases = ["odometry.0", "laser.0", "camera.0", "depth.0"]
@@ -88,11 +75,11 @@ program = PROGRAM
 
 const ODOMETRY: [&str; 2] = ["odometry.0", "odometry"];
 
-fn launched(place: &Place) -> (Running, Robot) {
+fn launched() -> (Place, Running, Robot) {
     let map = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
     let program = program("streams_described::reader");
     let text = ROBOT.replace("MAP", map).replace("PROGRAM", &program);
-    place.launched(&[RECORDED_CLASSES, &text, OUTPUT])
+    Place::running(&[&RECORDED_CLASSES, &classes("camera 112, depth 104, reader 94"), &text, OUTPUT])
 }
 
 fn interp(place: &Place, stream: &[&str], more: &[&str]) -> Said {
@@ -115,8 +102,7 @@ fn number(value: &Value) -> f64 {
 
 #[test]
 fn a_value_agrees_with_the_records_around_it_and_with_what_a_module_gets() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place);
+    let (place, mut launch, _robot) = launched();
     let found = value_on_the_way(&place);
     let stamp_ns = |of: &Value| of["stamp_ns"].as_u64().unwrap();
     let (at_ns, before, after) = (stamp_ns(&found), &found["before"], &found["after"]);
@@ -151,15 +137,12 @@ fn a_value_agrees_with_the_records_around_it_and_with_what_a_module_gets() {
     // A module gets the very same.
     let typed = place.say(&["call", "reader.0", "odometry_at", &ns, "--json"]).json();
     assert_eq!(typed, found["value"]);
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn a_time_without_a_value_says_exactly_why_and_one_to_come_is_waited_for() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place);
+    let (place, mut launch, _robot) = launched();
     let found = value_on_the_way(&place);
     let (at, ns) = ("--at", found["stamp_ns"].to_string());
     let [before_ns, after_ns] = ["before", "after"].map(|side| found[side]["stamp_ns"].as_u64().unwrap());
@@ -175,8 +158,7 @@ fn a_time_without_a_value_says_exactly_why_and_one_to_come_is_waited_for() {
         (["odometry.0", "7"], &[at, &ns], "odometry.0 has no stream 7; it has 1"),
         (["motor.0", "motion"], &[at, &ns], "is data and no stream; `rohrpost echo motor.0 motion` prints it"),
     ] {
-        let told = interp(&place, &stream, more).fails();
-        assert!(told.contains(words), "{more:?}: {told}");
+        interp(&place, &stream, more).fails_with([words]);
     }
     let said = interp(&place, &ODOMETRY, &[at, "+1h", "--json"]);
     let refusal: Value = serde_json::from_str(&said.out).unwrap();
@@ -184,19 +166,16 @@ fn a_time_without_a_value_says_exactly_why_and_one_to_come_is_waited_for() {
     assert!(refusal["by_ns"].as_u64() <= Some(3_600_000_000_000), "{refusal}");
     let awaited = interp(&place, &ODOMETRY, &[at, "+0.3s", "--wait", "60s", "--json"]).json();
     assert!(awaited["stamp_ns"].as_u64() > found["stamp_ns"].as_u64(), "{awaited}");
-    std::fs::write(place.path("a"), b"hello").unwrap();
+    place.write("a", b"hello");
     place.say(&["stream", "write", "odometry.0", "40", "a", "a"]).ok();
-    let told = interp(&place, &["odometry.0", "40"], &[at, "-0s"]).fails();
-    assert!(told.contains("odometry.0 40: no module has left a description of it here"), "{told}");
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    interp(&place, &["odometry.0", "40"], &[at, "-0s"])
+        .fails_with(["odometry.0 40: no module has left a description of it here"]);
+    place.end(&mut launch);
 }
 
 #[test]
 fn records_are_told_as_the_module_describes_them_and_a_picture_by_its_size_and_head() {
-    let place = Place::new();
-    let (mut launch, robot) = launched(&place);
+    let (place, mut launch, _robot) = launched();
     let read = |stream: &[&str], more: &[&str]| place.say(&[&["stream", "read"], stream, more].concat());
     value_on_the_way(&place);
     let newest = read(&ODOMETRY, &["--json"]).json();
@@ -207,9 +186,7 @@ fn records_are_told_as_the_module_describes_them_and_a_picture_by_its_size_and_h
     assert!(line.starts_with(&words) && line.contains(" B  {pose: {x_m: "), "{line}");
     // The same as the type itself reads from the bytes.
     let bytes = read(&ODOMETRY, &[&from[..], &["--hex", "--json"]].concat()).json();
-    let hex = bytes["hex"].as_str().unwrap();
-    let bytes: Vec<u8> =
-        (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect();
+    let bytes = unhex(bytes["hex"].as_str().unwrap());
     let odometry: Odometry = rohrpost::wire::from_bytes(&bytes).unwrap();
     let value = &newest["value"];
     assert!((odometry.pose.x_m - number(&value["pose"]["x_m"])).abs() < 1e-12, "{value}");
@@ -233,15 +210,12 @@ fn records_are_told_as_the_module_describes_them_and_a_picture_by_its_size_and_h
     items.sort();
     assert_eq!(items, ["camera.0 image", "depth.0 points", "laser.0 scan", "odometry.0 odometry"]);
     for list in [&["stream", "list"][..], &["list", "--streams"]] {
-        let list = place.say(list).ok();
-        assert!(list.contains("odometry.0  odometry       1  "), "{list}");
+        place.say(list).ok_with(["odometry.0  odometry       1  "]);
     }
     let info = place.say(&["stream", "info", "camera.0", "image"]).ok();
     assert!(info.starts_with("stream camera.0 1, image, node main\n"), "{info}");
     let top = place.say(&["top", "--json"]).json();
     assert!(top["streams"].as_array().unwrap().iter().any(|stream| stream["item"] == "points"), "{top}");
     assert_eq!(offered(&place, &["rohrpost", "stream", "interp", "odometry.0", ""]), ["odometry"]);
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }

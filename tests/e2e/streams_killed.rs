@@ -1,14 +1,13 @@
 //! The demo's simulation is killed again and again: readers of its streams go on by themselves, and each accounts for
 //! all that was written.
 
-use crate::harness::{PATIENCE, Place, Robot, signal, wait};
+use crate::harness::{PATIENCE, Place, Robot, json_lines, signal, times, until, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost::Name;
 use rohrpost::description::noted;
 use rohrpost::schema::{DataItem, decode};
 use rohrpost_mailbox::{HeldRecord, Next, Participant, RecordInfo, StreamId, StreamInfo, StreamReader};
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
@@ -19,12 +18,6 @@ const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo.toml");
 const MAP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
 /// The stream of pictures keeps one record less: a reader that comes after so many has lost some.
 const RECORDS_BETWEEN_KILLS: usize = 9;
-
-/// How often the simulation is killed: for a long run,
-/// `ROHRPOST_KILLS=100 cargo test -p rohrpost-cli --test e2e streams_killed`.
-fn kills() -> u32 {
-    std::env::var("ROHRPOST_KILLS").ok().map_or(10, |kills| kills.parse().unwrap())
-}
 
 /// The demo without its GUI, with a simulation that is never given up. The mapper begins before the simulation: so it
 /// accounts for each record that is ever written.
@@ -44,8 +37,7 @@ fn demo(place: &Place) -> PathBuf {
         within = "50 ms"
     };
     sim.insert("restart".into(), restart.into());
-    let file = place.path("demo.toml");
-    std::fs::write(&file, toml::to_string(&demo).unwrap()).unwrap();
+    let file = place.write("demo.toml", toml::to_string(&demo).unwrap());
     file
 }
 
@@ -202,11 +194,6 @@ impl Readers {
     }
 }
 
-/// Objects that a tool has printed, one a line.
-fn printed(out: &str) -> Vec<Value> {
-    out.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"))).collect()
-}
-
 /// Waits until the mapper publishes the pose of a scan of this time or later.
 fn wait_mapped(place: &Place, stamp_ns: u64) {
     wait("the mapper maps scans of the new incarnation", || {
@@ -227,7 +214,7 @@ fn mapper_accounts(robot: &Robot) -> u64 {
 /// A tool that reads odometry from its first record on.
 fn start_tool(place: &Place) -> Running {
     let words = ["stream", "read", "odometry.0", "odometry", "--from", "0", "--next", "1000000", "--json"];
-    Running::start(place.command(&words))
+    place.start(&words)
 }
 
 /// Ends the tool once it has come to the end; what it printed is what this test has seen.
@@ -235,11 +222,11 @@ fn check_tool(tool: Running, odometry: &ObservedStream, written: u64) {
     wait("the tool comes to the end", || {
         let out = tool.out();
         let (whole, _) = out.rsplit_once('\n')?;
-        printed(whole.lines().last()?)[0]["sequence"].as_u64().filter(|sequence| sequence + 1 == written)
+        json_lines(whole.lines().last()?)[0]["sequence"].as_u64().filter(|sequence| sequence + 1 == written)
     });
     tool.signal(Signal::SIGINT);
     let mut at = 0;
-    for object in printed(&tool.said().ok()) {
+    for object in json_lines(&tool.said().ok()) {
         if let [Some(lost), Some(sampled), Some(passed_over)] =
             ["lost", "sampled", "passed_over"].map(|cause| object[cause].as_u64())
         {
@@ -276,23 +263,23 @@ fn check_value_at_a_time(place: &Place, odometry: &mut ObservedStream, follower:
 fn a_simulation_that_is_killed_again_and_again_loses_no_reader_and_each_record_is_accounted_for() {
     let place = Place::new();
     let config = demo(&place);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (mut launch, robot) = place.launched_from(&config);
     let participant = Participant::join(&robot.node, Name::NONE).unwrap();
     let mut readers = Readers::new(&robot, &participant);
     let [mut holder, mut keeper] = [(); 2].map(|()| participant.stream_reader(readers.streams[0].id).unwrap());
     let mut tool = start_tool(&place);
     // Those of this test; the mapper looks at scans and odometry, the tool at odometry.
     let seats = [4, 2, 3];
-    wait("the tool has its seat", || (readers.seats(&robot) == seats).then_some(()));
+    until("the tool has its seat", || readers.seats(&robot) == seats);
     let others = || ["mapper.0", "pilot.0", "output.0"].map(|module| robot.pid(module));
     let pids = others();
     readers.read_next_incarnation(1);
     // Held until the end, the other over one kill each.
     let kept = keeper.newest().unwrap().unwrap();
     readers.streams[0].check(&kept);
-    for kill in 1..=kills() {
+    // For a long run: `ROHRPOST_KILLS=100 cargo test -p rohrpost-cli --test e2e streams_killed`.
+    let kills = times("ROHRPOST_KILLS", 10);
+    for kill in 1..=kills {
         let held = holder.newest().unwrap().unwrap();
         readers.streams[0].check(&held);
         let sim = robot.pid("motor.0");
@@ -308,9 +295,9 @@ fn a_simulation_that_is_killed_again_and_again_loses_no_reader_and_each_record_i
     }
     check_value_at_a_time(&place, &mut readers.streams[2], &mut readers.followers[2]);
     place.say(&["stop", "motor.0"]).ok();
-    readers.read_rest(&robot, kills());
+    readers.read_rest(&robot, kills);
     let [_, scans, odometry] = readers.streams.each_ref().map(|stream| stream.info(&robot).written);
-    wait("the mapper has come to all scans", || (mapper_accounts(&robot) >= scans).then_some(()));
+    until("the mapper has come to all scans", || mapper_accounts(&robot) >= scans);
     assert_eq!(mapper_accounts(&robot), scans, "read and lost are what was written");
     check_tool(tool, &readers.streams[2], odometry);
     drop(kept);

@@ -1,6 +1,6 @@
 //! Stuck, failed and incompatible modules are visible from outside, in the same words everywhere, and the others go on.
 
-use crate::harness::{OUTPUT, Place, Robot, probe, wait};
+use crate::harness::{OUTPUT, Place, Robot, probe, until, wait};
 use crate::output::lines;
 use crate::probe::WORK;
 use crate::process::{Running, without_real_time};
@@ -36,16 +36,15 @@ fn standing(place: &Place, module: &str, state: &str) -> Value {
 
 fn begun(place: &Place, modules: &[&str]) -> (Running, Robot) {
     let config = place.config(modules);
-    let mut launch = Running::start(place.command(&["launch", "--quiet", config.to_str().unwrap()]));
+    let mut launch = place.start(&["launch", "--quiet", config.to_str().unwrap()]);
     let robot = place.robot(&config, "main", &mut launch);
     (launch, robot)
 }
 
 #[test]
 fn a_handler_that_does_not_come_back_is_seen_from_outside() {
-    let place = Place::new();
     let keys = "busy-after = \"300 ms\"\nstop-within = \"200 ms\"";
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", keys), &probe("probe.1", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", keys), &probe("probe.1", "", "")]);
     assert_eq!(standing(&place, "probe.0", "on")["error"], Value::Null);
     let mut tool = robot.tool(Duration::from_secs(60));
     robot.begin(&mut tool, "probe.0", WORK, &(600_000_u64,));
@@ -64,7 +63,6 @@ fn a_handler_that_does_not_come_back_is_seen_from_outside() {
     });
     assert!(warned["text"].as_str().unwrap().contains("hears nobody"), "{warned}");
     tool.close();
-    drop(robot);
     let out = launch.stop();
     let notes = out.lines().filter(|line| line.starts_with("probe.0 is busy: in `work` for "));
     assert_eq!(notes.count(), 1, "told once: {out}");
@@ -72,14 +70,13 @@ fn a_handler_that_does_not_come_back_is_seen_from_outside() {
 
 #[test]
 fn a_handler_that_was_long_says_so_when_it_comes_back() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "busy-after = \"50 ms\"")]);
+    let (place, _launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "busy-after = \"50 ms\"")]);
     let mut tool = robot.tool(Duration::from_secs(60));
     robot.begin(&mut tool, "probe.0", WORK, &(300_u64,));
-    wait("it says so", || {
+    until("it says so", || {
         let all = lines(&place, "probe.0");
         let was = |line: &Value| line["text"].as_str().unwrap().starts_with("was in `work` for 0.");
-        all.iter().any(was).then_some(())
+        all.iter().any(was)
     });
     tool.close();
 }
@@ -97,7 +94,7 @@ fn modules_that_fail_keep_nobody_from_starting_and_have_the_same_state_everywher
             "[[module]]\nname = \"probe.4\"\nprogram = \"./not-there\"\noptional = true\n",
         ],
     );
-    wait("the last is on", || (robot.state("probe.3") == "on").then_some(()));
+    until("the last is on", || robot.state("probe.3") == "on");
     let waiting = standing(&place, "probe.0", "restarting");
     assert_eq!(
         (&waiting["attempt"], &waiting["attempts_max"], &waiting["restarts"]),
@@ -113,7 +110,6 @@ fn modules_that_fail_keep_nobody_from_starting_and_have_the_same_state_everywher
     assert_eq!((&stopped["state"], &stopped["error"]), (&"stopped".into(), &"left out: its program is missing".into()));
     place.say(&["stop", "probe.3", "--timeout", "60"]).ok();
     standing(&place, "probe.3", "stopped");
-    drop(robot);
     launch.signal(Signal::SIGINT);
     let said = launch.said();
     assert_eq!(said.code, Some(1), "{said:?}");
@@ -126,7 +122,7 @@ fn a_module_that_is_required_keeps_its_node_from_starting() {
     let place = Place::new();
     let required = "required = true\nrestart = { backoff = \"1 ms\", at-most = 2 }";
     let config = place.config(&[&probe("probe.0", "", ""), &probe("probe.1", "refuse-at-start = true", required)]);
-    let said = Running::start(place.command(&["launch", "--quiet", config.to_str().unwrap()])).said();
+    let said = place.start(&["launch", "--quiet", config.to_str().unwrap()]).said();
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.err.contains("module probe.1 did not become ready"), "{said:?}");
     assert!(said.err.contains("given up after 2 restarts"), "{said:?}");
@@ -139,7 +135,7 @@ fn an_interface_that_no_name_of_the_module_fits_is_refused_at_the_start() {
     let config = place.config(&[&probe("wheel.0", "rate-hz = 100.0", "")]);
     let text = std::fs::read_to_string(&config).unwrap();
     std::fs::write(&config, text.replace("probe = { id = 96 }", "probe = { id = 96 }\nwheel = { id = 97 }")).unwrap();
-    let said = Running::start(place.command(&["launch", "--quiet", config.to_str().unwrap()])).said();
+    let said = place.start(&["launch", "--quiet", config.to_str().unwrap()]).said();
     assert_eq!(said.code, Some(1), "{said:?}");
     let both = "the program of `wheel.0` serves an interface of class `probe`, but the module is called `wheel.0`";
     assert!(said.err.contains(both), "{said:?}");
@@ -149,11 +145,10 @@ fn an_interface_that_no_name_of_the_module_fits_is_refused_at_the_start() {
 #[test]
 fn data_of_an_interface_that_the_module_does_not_serve_are_refused_and_launch_says_so() {
     let place = Place::new();
-    let (launch, robot) = begun(&place, &[&probe("probe.0", "foreign-data = true", "")]);
+    let (launch, _robot) = begun(&place, &[&probe("probe.0", "foreign-data = true", "")]);
     // Launch asks for the reason, and tools see it from then on.
     let why = wait("the reason", || standing(&place, "probe.0", "error")["error"].as_str().map(str::to_owned));
     assert!(why.contains("data `noise` of an interface of class `probe`") && why.contains("as `probe.0`"), "{why}");
-    drop(robot);
     launch.signal(Signal::SIGINT);
     let said = launch.said();
     assert_eq!(said.code, Some(1), "{said:?}");
@@ -169,10 +164,7 @@ fn without_the_right_to_real_time_the_terminal_says_so() {
     std::fs::write(&config, text.replace("real-time-from = 256", "real-time-from = 96")).unwrap();
     let mut command = place.command(&["launch", "--quiet", config.to_str().unwrap()]);
     without_real_time(&mut command);
-    let mut launch = Running::start(command);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
-    drop(robot);
+    let (mut launch, _robot) = place.up(command, &config, "main");
     let out = launch.stop();
     assert!(out.contains("no real time: probe.0, probe.1 run like ordinary programs"), "{out}");
 }

@@ -1,9 +1,9 @@
 //! A subscriber names the mailbox for the data, and takes only what it asked for there.
 
-use crate::harness::{PATIENCE, Place, Robot, halt, probe, program, signal, wait};
+use crate::harness::{PATIENCE, Place, Robot, halt, probe, program, run_if_launched, signal, until, wait};
 use crate::probe::{NEWEST, ProbingInterface, SWAPPED};
 use nix::sys::signal::Signal;
-use rohrpost::common::{DataHead, GET_DATA, Refused, SUBSCRIBE, Subscribe};
+use rohrpost::common::{DataHead, Refused, SUBSCRIBE, Subscribe};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Context, Module, ModuleError, ToolLink};
 use rohrpost_mailbox::{Kind, Label, Loss, Name, Options, Participant, Shape, Type, local};
@@ -11,11 +11,7 @@ use rohrpost_modules::call::CallEnvelope;
 
 /// The newest published beat: it has been sent to all subscribers of each beat.
 fn beat(robot: &Robot, tool: &mut ToolLink) -> u64 {
-    let (module, hash) = (robot.name("probe.0"), ProbingInterface::hash());
-    let number = ProbingInterface::BEAT.number;
-    let (_stamp_ns, beat): (u64, u64) =
-        tool.call(module, GET_DATA, hash, |body| append(body, &(number,)), |bytes| from_bytes(bytes)).unwrap();
-    beat
+    robot.newest(tool, "probe.0", ProbingInterface::BEAT).unwrap().1
 }
 
 /// Beats that `probe.1` has written down.
@@ -31,25 +27,24 @@ fn replaced(robot: &Robot) -> u64 {
 
 #[test]
 fn a_mailbox_of_ones_own_holds_the_newest_and_the_other_holds_each() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[
+    let (place, mut launch, robot) = Place::running(&[
         &probe("probe.0", "rate-hz = 100.0", ""),
         &probe("probe.1", "hears = \"probe.0\"", "calls = [\"probe.0\"]\nmailbox.data.slots = 1024"),
     ]);
     let mut tool = robot.tool(PATIENCE);
-    wait("beats come to both", || {
+    until("beats come to both", || {
         let both = [heard(&place, "each"), heard(&place, "newest")];
-        both.iter().all(|beats| !beats.is_empty()).then_some(())
+        both.iter().all(|beats| !beats.is_empty())
     });
     let pid = robot.pid("probe.1");
     halt(pid);
     let (halted, before) = (beat(&robot, &mut tool), replaced(&robot));
-    wait("beats replace each other", || (replaced(&robot) >= before + 20).then_some(()));
+    until("beats replace each other", || replaced(&robot) >= before + 20);
     let continued = beat(&robot, &mut tool);
     signal(pid, Signal::SIGCONT);
-    wait("newer beats come to both", || {
+    until("newer beats come to both", || {
         let both = [heard(&place, "each"), heard(&place, "newest")];
-        both.iter().all(|beats| beats.last().is_some_and(|last| *last > continued)).then_some(())
+        both.iter().all(|beats| beats.last().is_some_and(|last| *last > continued))
     });
     let newest = heard(&place, "newest");
     let old: Vec<&u64> = newest.iter().filter(|beat| (halted + 1..continued).contains(beat)).collect();
@@ -93,10 +88,7 @@ impl OldProbing for OldProbe {}
 /// Not a test: a module that launch starts. Run as a test it ends at once.
 #[test]
 fn old_probe() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<OldProbe>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-    }
+    run_if_launched::<OldProbe>();
 }
 
 /// The publisher is built anew with another interface, and then as it was.
@@ -114,7 +106,7 @@ fn a_subscription_that_an_interface_ends_is_seen_by_all_tools_and_comes_back_whe
     let subscriber = probe("probe.1", "hears = \"probe.0\"", "calls = [\"probe.0\"]");
     let (mut launch, robot) = place.launched(&[&publisher, &subscriber]);
     robot.wait_on(&mut launch);
-    wait("beats come", || (!heard(&place, "each").is_empty()).then_some(()));
+    until("beats come", || !heard(&place, "each").is_empty());
     std::fs::write(&old, "").unwrap();
     place.say(&["restart", "probe.0"]).ok();
     let words = "subscription to `beat` of probe.0: interface differs";
@@ -127,27 +119,25 @@ fn a_subscription_that_an_interface_ends_is_seen_by_all_tools_and_comes_back_whe
         line["error"].as_str().unwrap_or_default().to_owned()
     };
     for tool in [&["status"][..], &["list"], &["top"]] {
-        wait(format!("{tool:?} tells"), || {
+        until(format!("{tool:?} tells"), || {
             let error = error(tool);
-            (error.contains(words) && error.contains(what)).then_some(())
+            error.contains(words) && error.contains(what)
         });
     }
     launch.wait_for(words);
     std::fs::remove_file(&old).unwrap();
     let before = heard(&place, "each").len();
     place.say(&["restart", "probe.0"]).ok();
-    wait("beats come again", || (heard(&place, "each").len() > before + 5).then_some(()));
+    until("beats come again", || heard(&place, "each").len() > before + 5);
     for tool in [&["status"][..], &["list"], &["top"]] {
-        wait(format!("{tool:?} complains of nothing"), || error(tool).is_empty().then_some(()));
+        until(format!("{tool:?} complains of nothing"), || error(tool).is_empty());
     }
-    drop(robot);
     launch.stop();
 }
 
 #[test]
 fn data_do_not_go_where_commands_and_replies_go() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 100.0", "")]);
+    let (_place, mut launch, robot) = Place::running(&[&probe("probe.0", "rate-hz = 100.0", "")]);
     let mut tool = robot.tool(PATIENCE);
     for mailbox in [local::COMMANDS, local::REPLIES] {
         let wish = Subscribe { number: 1, id: 1, period_us: 0, lease_ms: 60_000, mailbox };
@@ -169,9 +159,8 @@ fn refuses(robot: &Robot, tool: &mut ToolLink, expected: Refused) {
 
 #[test]
 fn data_that_nobody_asked_for_are_dropped_and_counted_by_cause() {
-    let place = Place::new();
     // The test itself is the publisher: so it knows the subscription, and can send everything else.
-    let (mut launch, robot) = place.launched(&[&probe("probe.1", "hears = \"probe.7\"", "")]);
+    let (place, mut launch, robot) = Place::running(&[&probe("probe.1", "hears = \"probe.7\"", "")]);
     let mut tool = robot.tool(PATIENCE);
     let (module, publisher) = (robot.name("probe.1"), robot.name("probe.7"));
     let mut asked = Participant::join(&robot.node, publisher).unwrap().receiver(publisher, Shape::default()).unwrap();
@@ -212,7 +201,7 @@ fn data_that_nobody_asked_for_are_dropped_and_counted_by_cause() {
         ..Refused::default()
     };
     refuses(&robot, &mut tool, expected);
-    wait("what it asked for comes", || (!heard(&place, "each").is_empty()).then_some(()));
+    until("what it asked for comes", || !heard(&place, "each").is_empty());
     assert_eq!((heard(&place, "each"), heard(&place, "newest")), (vec![8], vec![]));
     tool.close();
     launch.stop();
@@ -220,22 +209,21 @@ fn data_that_nobody_asked_for_are_dropped_and_counted_by_cause() {
 
 #[test]
 fn a_subscriber_that_restarts_with_its_subscriptions_in_another_order_takes_no_other_type() {
-    let place = Place::new();
     const BLOB: u64 = 3000;
     let settings = format!("rate-hz = 100.0, blob-hz = 100.0, blob-bytes = {BLOB}");
-    let (mut launch, robot) = place.launched(&[
+    let (place, mut launch, robot) = Place::running(&[
         &probe("probe.0", &settings, ""),
         &probe("probe.1", "mixes = \"probe.0\"", "calls = [\"probe.0\"]"),
     ]);
     let mut tool = robot.tool(PATIENCE);
     let mixed = |what: &str| heard(&place, &format!("mixed {what}"));
-    wait("it hears both", || (!mixed("beat").is_empty() && !mixed("blob").is_empty()).then_some(()));
-    std::fs::write(place.path(SWAPPED), "").unwrap();
+    until("it hears both", || !mixed("beat").is_empty() && !mixed("blob").is_empty());
+    place.write(SWAPPED, "");
     let pid = robot.pid("probe.1");
     let before = mixed("beat").len();
     signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.1", pid);
-    wait("it hears again", || (mixed("beat").len() > before + 20).then_some(()));
+    until("it hears again", || mixed("beat").len() > before + 20);
     // Data for its earlier incarnation arrived, and the beats are the publisher's own.
     let refused = tool.status(robot.name("probe.1")).unwrap().refused;
     let said = place.record().join("\n");

@@ -1,27 +1,16 @@
 //! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south`
 //! (system 2) reaches it. Where system 1 has a LAN, `arm` is on it; else `arm` may be a system of its own.
 
-use crate::harness::{NETWORK, Place, Robot, lab, probe, wait};
-use crate::probe::ProbingInterface;
+use crate::harness::{Place, head, lab, probe, repository, until};
+use crate::network::{NETWORK, Network, nodes};
 use crate::process::{Running, Said};
 use rohrpost::CallError;
-use rohrpost::wire::{append, from_bytes};
-use rohrpost_routers::lab::Lab;
+use std::ops::Deref;
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Classes and scheduling, as in all configurations with a TCP router.
-pub(crate) const CLASSES: &str = r#"
-[classes]
-router = { id = 250 }
-probe = { id = 96 }
-tcp = { id = 64, text = "Carries packages beyond the LAN" }
-output = { id = 32, text = "Collects what modules say" }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-"#;
+/// As in all configurations with a TCP router.
+pub(crate) const CLASSES: &str = "router 250, probe 96, tcp 64, output 32, tool 16";
 
 /// Nodes, the first two of which are systems, and their addresses.
 pub(crate) const NODES: [(&str, &str); 3] = [("north", "10.79.0.1"), ("south", "10.79.0.2"), ("arm", "10.79.0.3")];
@@ -31,10 +20,15 @@ pub(crate) const SEALED: &str = "security = \"tls\"\ncertificates = \"certificat
 
 /// Two systems, as configured of one installation.
 pub(crate) struct Systems {
-    // Dropped in this order: processes, what they left, their network.
-    pub(crate) nodes: Vec<(&'static str, Running, Robot)>,
-    pub(crate) place: Place,
-    lab: Lab,
+    pub(crate) network: Network,
+}
+
+impl Deref for Systems {
+    type Target = Network;
+
+    fn deref(&self) -> &Network {
+        &self.network
+    }
 }
 
 impl Systems {
@@ -43,9 +37,10 @@ impl Systems {
         let lab = lab(NODES, "systems that meet")?;
         let place = Place::new();
         for (system, id) in SYSTEMS.into_iter().zip(1..) {
-            std::fs::write(place.path(&format!("{system}.toml")), configured(system, id, security)).unwrap();
+            place.write(&format!("{system}.toml"), configured(system, id, security));
         }
-        Some(Self { nodes: Vec::new(), place, lab })
+        let config = place.path("north.toml");
+        Some(Self { network: Network::new(place, config, Some(lab)) })
     }
 
     pub(crate) fn launched(security: &str) -> Option<Self> {
@@ -72,10 +67,7 @@ impl Systems {
         let config = self.config("north");
         let text = std::fs::read_to_string(&config).unwrap();
         let [(_, north), _, (_, arm)] = NODES;
-        let nodes = format!(
-            "[nodes.north]\naddress = \"{north}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\n\
-             tools = [16, 31]\n{NETWORK}[tcp]"
-        );
+        let nodes = nodes([("north", north), ("arm", arm)]) + NETWORK + "[tcp]";
         let text = text.replace("[nodes.north]\n[tcp]", &nodes)
             + "node = \"north\"\n"
             + &probe("probe.1", "", "node = \"arm\"");
@@ -84,24 +76,15 @@ impl Systems {
 
     /// `arm`, of a system of its own, is refused, and both it and the TCP router report the reason.
     pub(crate) fn wait_refused(&self, here: &str, there: &str) {
-        wait(format!("arm is refused: {here}"), || {
+        until(format!("arm is refused: {here}"), || {
             let told = self.client("arm");
-            (told["state"] != "up" && told["why"].as_str().is_some_and(|why| why.contains(here))).then_some(())
+            told["state"] != "up" && told["why"].as_str().is_some_and(|why| why.contains(here))
         });
-        wait(format!("the TCP router refuses: {there}"), || {
-            self.says("north", &["net"]).out.contains(there).then_some(())
-        });
+        until(format!("the TCP router refuses: {there}"), || self.says("north", &["net"]).out.contains(there));
     }
 
     pub(crate) fn launch(&mut self, node: &'static str) {
-        let command = self.place.command(&["launch", self.config(node).to_str().unwrap(), "--node", node]);
-        let mut launch = {
-            let _inside = self.lab.enter(node).unwrap();
-            Running::start(command)
-        };
-        let robot = self.place.robot(&self.config(node), node, &mut launch);
-        robot.wait_on(&mut launch);
-        self.nodes.push((node, launch, robot));
+        self.network.launch_from(&self.config(node), &[node]);
     }
 
     /// The output of `net` about a node's client of the TCP router.
@@ -112,7 +95,7 @@ impl Systems {
     }
 
     pub(crate) fn wait_up(&self, node: &str) {
-        wait(format!("{node} takes part"), || (self.client(node)["state"] == "up").then_some(()));
+        until(format!("{node} takes part"), || self.client(node)["state"] == "up");
     }
 
     /// A person's command at a node.
@@ -127,42 +110,18 @@ impl Systems {
             // Of a system that no file describes.
             digest.system = 1;
         }
-        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/e2e/python/foreign.py");
-        let arguments = [page, NODES[0].1, "21119", &digest.to_string(), name, order, "1.96.0.0"];
-        self.python(&[&arguments, certificates].concat())
-    }
-
-    /// Python at `south`'s computer.
-    pub(crate) fn python(&self, arguments: &[&str]) -> Running {
-        let mut command = Command::new("python3");
-        // Beside the sources nothing is to be written.
-        command.arg("-B").args(arguments).current_dir(self.place.path(""));
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let _inside = self.lab.enter("south").unwrap();
-        Running::start(command)
-    }
-
-    pub(crate) fn robot(&self, node: &str) -> &Robot {
-        &self.nodes.iter().find(|(known, ..)| *known == node).unwrap().2
+        let page = repository("tests/e2e/python/foreign.py");
+        let arguments = [&page, NODES[0].1, "21119", &digest.to_string(), name, order, "1.96.0.0"];
+        self.python("south", &[&arguments, certificates].concat())
     }
 
     /// The result of counting at `south`, called from `north`.
     pub(crate) fn count(&self, number: u32) -> Result<u64, CallError> {
-        let north = self.robot("north");
-        let mut tool = north.tool(Duration::from_secs(1));
-        let write = |body: &mut Vec<u8>| append(body, &(number,));
-        let (probe, hash) = (north.name("2.probe.0.0"), ProbingInterface::hash());
-        let counted = tool.call(probe, crate::probe::COUNT, hash, write, |bytes| from_bytes(bytes));
-        tool.close();
-        counted
+        self.robot("north").count("2.probe.0.0", number, Duration::from_secs(1))
     }
 
-    pub(crate) fn stop(mut self) {
-        for (_, mut launch, robot) in self.nodes.drain(..) {
-            drop(robot);
-            launch.stop();
-        }
-        self.place.assert_empty();
+    pub(crate) fn stop(self) {
+        self.network.stop();
     }
 }
 
@@ -172,9 +131,8 @@ pub(crate) fn configured(node: &str, id: u8, security: &str) -> String {
     // South's module follows north's.
     let hears = if id == 2 { ", hears = \"1.probe.0.0\"" } else { "" };
     format!(
-        "installation = \"test\"\n[system]\nname = \"{node}\"\nid = {id}\n{CLASSES}[nodes.{node}]\n[tcp]\n{security}\n\
-         address = \"{address}\"\n\
-         {server}{}",
+        "{}[nodes.{node}]\n[tcp]\n{security}\naddress = \"{address}\"\n{server}{}",
+        head(CLASSES).replace("\"robot\"\nid = 1", &format!("\"{node}\"\nid = {id}")),
         probe("probe.0", &format!("rate-hz = 20.0{hears}"), "")
     )
 }
@@ -185,10 +143,9 @@ pub(crate) fn check_crossing(systems: &Systems) {
     assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "2"]).ok(), "2\n", "by another tool");
     assert_eq!(systems.says("south", &["call", "1.probe.0.0", "count", "3"]).ok(), "1\n", "the other way");
     let hears = || systems.place.record().iter().any(|line| line.starts_with("probe.0 each "));
-    wait("beats of the other system's module", || hears().then_some(()));
+    until("beats of the other system's module", || hears());
     let data = systems.says("north", &["echo", "2.probe.0.0", "beat", "--count", "3"]).ok();
     assert_eq!(data.lines().count(), 3, "{data}");
     let word = "x".repeat(900);
-    let told = systems.says("north", &["call", "2.probe.0.0", "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
-    assert!(told.contains(&word), "{told}");
+    systems.says("north", &["call", "2.probe.0.0", "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok_with([&word]);
 }

@@ -4,15 +4,13 @@
 mod losses;
 mod waits;
 
-use crate::harness::{Place, Robot, lacks_namespaces, runs, signal, wait};
+use crate::harness::{Place, Robot, assert_has, lacks_namespaces, runs, signal, times, until, wait};
 use crate::process::{Running, Said};
 use losses::{Before, CYCLE, Kill, REPLACED, check_losses, check_lost_of_sealed, most_left_out};
 use nix::sys::signal::Signal;
-use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::RouterInterface;
 use rohrpost::schema::Data;
-use rohrpost::wire::{append, from_bytes};
 use rohrpost_testbed::stalls::{Late, unless_stalled};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -31,11 +29,6 @@ const STEADY_MS: u64 = 10_500;
 const FEW: usize = 3;
 /// A demo that kills its master goes on for longer than this; a master is there again and settled before.
 const WATCHED: Duration = Duration::from_secs(2);
-
-/// How often the master is killed: for a long run, `ROHRPOST_KILLS=100 cargo test --test e2e takeover`.
-fn kills() -> usize {
-    std::env::var("ROHRPOST_KILLS").ok().map_or(FEW, |kills| kills.parse().unwrap())
-}
 
 /// After so many cycles the others have a new master.
 const CYCLES_MAX: u64 = 4;
@@ -64,9 +57,7 @@ fn lost_so_far(robots: &[Robot; 3]) -> Option<Before> {
 /// The report of a node's router, if it answers.
 fn said<T: Data>(robot: &Robot, router: &str, port: DataPort<T>) -> Option<T> {
     let mut tool = robot.tool_if_there(SOON)?;
-    let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
-    let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
-    let said = tool.call(robot.name(router), GET_DATA, RouterInterface::hash(), ask, read);
+    let said = robot.newest(&mut tool, router, port);
     tool.close();
     said.ok().map(|(_, said)| said)
 }
@@ -104,10 +95,10 @@ struct Killed {
 
 /// A demo of which all nodes run; none where there are no namespaces.
 fn started(place: &Place, arguments: &[&str]) -> Option<(Running, [Robot; 3])> {
-    let mut demo = Running::start(place.command(arguments));
-    wait("all nodes run, or cannot", || {
+    let mut demo = place.start(arguments);
+    until("all nodes run, or cannot", || {
         let all = NODES.iter().all(|node| demo.out().contains(&format!("node {node} of demo-tdma runs")));
-        (all || demo.ended().is_some()).then_some(())
+        all || demo.ended().is_some()
     });
     if lacks_namespaces(&demo.err()) {
         return None;
@@ -117,11 +108,13 @@ fn started(place: &Place, arguments: &[&str]) -> Option<(Running, [Robot; 3])> {
 
 fn killed_again(place: &Place) -> Option<Killed> {
     let (demo, robots) = started(place, &["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet", "-v"])?;
-    let ran_ms = if self::kills() > FEW { STEADY_MS } else { SETTLED_MS };
+    // For a long run: `ROHRPOST_KILLS=100 cargo test --test e2e takeover`.
+    let times = times("ROHRPOST_KILLS", FEW);
+    let ran_ms = if times > FEW { STEADY_MS } else { SETTLED_MS };
     let mut kills = Vec::new();
     wait("one master", || settled(&robots, ran_ms));
     let lost_before = wait("losses so far", || lost_so_far(&robots));
-    for _ in 0..self::kills() {
+    for _ in 0..times {
         let before = wait("slots", || left_out_so_far(&robots));
         let looked = Instant::now();
         let master = wait("one master", || settled(&robots, ran_ms));
@@ -218,11 +211,10 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
         let arguments =
             ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "-v", "--kill-master"];
         let Some((Said { out: said, .. }, kill, before)) = ended_well(&place, &arguments) else { return Ok(()) };
-        for words in
-            ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "]
-        {
-            assert!(said.contains(words), "no `{words}`:\n{said}");
-        }
+        assert_has(
+            &said,
+            ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "],
+        );
         assert!(said.contains("from before its death are lost") && said.contains("the accounts balance\n"), "{said}");
         place.assert_empty();
         check_losses(&said, std::slice::from_ref(&kill), &before)?;
@@ -245,11 +237,15 @@ fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
             ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "-v", "--kill-master"];
         let Some((Said { out, err, .. }, kill, _)) = ended_well(&place, &arguments) else { return Ok(()) };
         assert!(err.contains("is sealed with") || out.contains("is sealed with"), "{out}{err}");
-        for words in
-            ["killed on purpose); there again ", "It was the master. ", "Master at the end: ", "the accounts balance\n"]
-        {
-            assert!(out.contains(words), "no `{words}`:\n{out}");
-        }
+        assert_has(
+            &out,
+            [
+                "killed on purpose); there again ",
+                "It was the master. ",
+                "Master at the end: ",
+                "the accounts balance\n",
+            ],
+        );
         let used = slots(&out, "used");
         assert!(used.len() == NODES.len() && used.iter().all(|used| *used > 10), "slots used: {used:?}");
         place.assert_empty();

@@ -1,6 +1,6 @@
 //! A terminal of its own for a command, with a screen and a keyboard.
 
-use crate::harness::{PATIENCE, Place, wait};
+use crate::harness::{PATIENCE, Place, until};
 use crate::process::Running;
 use nix::fcntl::OFlag;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
@@ -83,7 +83,7 @@ impl Terminal {
 
     /// Waits until something was drawn, whatever it is now.
     pub(crate) fn wait_for(&self, words: &str) {
-        wait(format!("`{words}` on the screen"), || self.drawn().contains(words).then_some(()));
+        until(format!("`{words}` on the screen"), || self.drawn().contains(words));
     }
 
     /// Waits for a screen, and fails with the present one.
@@ -128,7 +128,7 @@ impl Terminal {
     #[track_caller]
     pub(crate) fn assert_restored(&self) {
         let left = |seen: &Seen| !seen.parser.screen().alternate_screen() && !seen.parser.screen().hide_cursor();
-        wait("the usual screen and a cursor", || left(&self.seen.lock().unwrap()).then_some(()));
+        until("the usual screen and a cursor", || left(&self.seen.lock().unwrap()));
         let flags = tcgetattr(self.master.as_fd()).unwrap().local_flags;
         assert!(flags.contains(LocalFlags::ECHO | LocalFlags::ICANON | LocalFlags::ISIG), "{flags:?}");
     }

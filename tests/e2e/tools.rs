@@ -1,6 +1,6 @@
 //! A user's commands at a running node, and the messages about mistakes.
 
-use crate::harness::{OUTPUT, Place, patient, probe, wait};
+use crate::harness::{OUTPUT, Place, assert_has, patient, probe, wait};
 use crate::process::Running;
 use std::process::{Command, Stdio};
 
@@ -40,25 +40,26 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
 }
 
 /// A node with a collector and a probe.
-fn node(place: &Place) -> Running {
-    place.launched(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]).0
+fn node() -> (Place, Running) {
+    let (place, launch, _) = Place::running(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);
+    (place, launch)
 }
 
 #[test]
 fn a_module_of_ones_own_is_known_by_its_description() {
-    let place = Place::new();
-    let _launch = node(&place);
+    let (place, _launch) = node();
     let text = place.say(&["call", "probe.0"]).ok();
-    for words in [
-        "class probe: Does what tests ask of it.",
-        "count <number: u32> -> u64",
-        "Writes the number into the record",
-        "refuse <why: text> -> u32, or error {Refused: {why: text}}",
-        "beat: u64",
-        "every module: on, off, status, get DATA, output-level LEVEL",
-    ] {
-        assert!(text.contains(words), "no `{words}` in:\n{text}");
-    }
+    assert_has(
+        &text,
+        [
+            "class probe: Does what tests ask of it.",
+            "count <number: u32> -> u64",
+            "Writes the number into the record",
+            "refuse <why: text> -> u32, or error {Refused: {why: text}}",
+            "beat: u64",
+            "every module: on, off, status, get DATA, output-level LEVEL",
+        ],
+    );
     let json = place.say(&["call", "probe.0", "--json"]).json();
     assert_eq!(json["class"], "probe");
     assert_eq!(json["functions"][0]["name"], "count");
@@ -66,8 +67,7 @@ fn a_module_of_ones_own_is_known_by_its_description() {
 
 #[test]
 fn calls_take_arguments_as_people_type_them() {
-    let place = Place::new();
-    let _launch = node(&place);
+    let (place, _launch) = node();
     for (arguments, answer) in [
         (&["count", "7"][..], "1"),
         (&["tell", "-3", "-0.5", "a word", "true", "[1, 2]"], "\"-3 -0.5 a word true [1, 2]\""),
@@ -94,8 +94,7 @@ fn calls_take_arguments_as_people_type_them() {
 
 #[test]
 fn mistakes_are_told_with_what_would_be_right() {
-    let place = Place::new();
-    let _launch = node(&place);
+    let (place, _launch) = node();
     for (arguments, words) in [
         (&["call", "prob.0"][..], &["prob"][..]),
         (&["call", "prob"], &["`prob` is no mailbox name; write class.instance"]),
@@ -186,12 +185,10 @@ fn tools_say_what_to_do_while_nothing_runs() {
     let place = Place::new();
     let commands = commands(&place);
     for arguments in commands.iter().filter_map(|command| at_a_node(command)) {
-        let told = place.say(&arguments).fails();
-        assert!(told.contains("no node runs here; launch one: `rohrpost launch FILE`"), "{arguments:?}: {told}");
+        place.say(&arguments).fails_with(["no node runs here; launch one: `rohrpost launch FILE`"]);
     }
     let config = place.config(&[OUTPUT]);
-    let told = place.say(&["list", "--config", config.to_str().unwrap()]).fails();
-    assert!(told.contains("is it launched?"), "{told}");
+    place.say(&["list", "--config", config.to_str().unwrap()]).fails_with(["is it launched?"]);
     let said = place.say(&["run", "output"]);
     assert_eq!(said.code, Some(2), "{said:?}");
     assert!(said.err.contains("--config FILE --name CLASS.INSTANCE"), "{said:?}");
@@ -204,14 +201,11 @@ fn tools_say_what_to_do_while_nothing_runs() {
 
 #[test]
 fn many_tools_work_at_the_same_time() {
-    let place = Place::new();
-    let mut launch = node(&place);
-    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat", "--json"]));
+    let (place, mut launch) = node();
+    let mut echo = place.start(&["echo", "probe.0", "beat", "--json"]);
     echo.wait_for("\n");
     let mut calls: Vec<Running> = (1..=8)
-        .map(|number| {
-            Running::start(place.command(&["call", "probe.0", "count", &number.to_string(), "--timeout", "30"]))
-        })
+        .map(|number| place.start(&["call", "probe.0", "count", &number.to_string(), "--timeout", "30"]))
         .collect();
     let mut answers: Vec<u64> = Vec::new();
     for call in &mut calls {
@@ -230,36 +224,29 @@ fn many_tools_work_at_the_same_time() {
 fn a_tool_too_many_is_told_so() {
     let place = Place::new();
     let config = place.config_of("test", "[nodes.main]\ntools = [5, 6]\n", &[&probe("probe.0", "rate-hz = 50.0", "")]);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (mut launch, _robot) = place.launched_from(&config);
     // Launch is the first tool, and this the other.
-    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat"]));
+    let mut echo = place.start(&["echo", "probe.0", "beat"]);
     echo.wait_for("\n");
-    let told = place.say(&["call", "probe.0", "count", "1"]).fails();
-    assert!(told.contains("no room for another tool on node `main`: programs run by hand have 1 instances"), "{told}");
+    let said = place.say(&["call", "probe.0", "count", "1"]);
+    said.fails_with(["no room for another tool on node `main`: programs run by hand have 1 instances"]);
     place.say(&["list"]).ok();
     echo.signal(nix::sys::signal::Signal::SIGKILL);
     echo.end();
     // The place of one that was killed is free again.
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn without_a_collector_there_is_no_log() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[&probe("probe.0", "", "")]);
-    let told = place.say(&["log"]).fails();
-    assert!(told.contains("output.0 does not run, and the configuration has no such module"), "{told}");
+    let (place, _launch, _robot) = Place::running(&[&probe("probe.0", "", "")]);
+    place.say(&["log"]).fails_with(["output.0 does not run, and the configuration has no such module"]);
 }
 
 #[test]
 fn a_closed_pipe_ends_a_tool_quietly() {
-    let place = Place::new();
-    let _launch = node(&place);
+    let (place, _launch) = node();
     let commands = commands(&place);
     let mut all: Vec<Vec<&str>> = commands.iter().filter_map(|command| at_a_node(command)).collect();
     all.extend([vec!["log", "--follow"], vec!["version"], vec!["completions", "bash"], vec!["clean"]]);

@@ -1,6 +1,6 @@
 //! What modules publish and say, as tools show it.
 
-use crate::harness::{OUTPUT, Place, probe, signal, wait};
+use crate::harness::{OUTPUT, Place, json_lines, probe, until};
 use crate::output::{call, is_own};
 use crate::process::Running;
 use crate::recorded::{RECORD, launched};
@@ -8,15 +8,10 @@ use nix::sys::signal::Signal;
 use std::os::unix::fs::FileExt;
 use std::time::Instant;
 
-fn lines(text: &str) -> Vec<serde_json::Value> {
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
-}
-
 #[test]
 fn echo_counts_and_numbers_what_comes() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
-    let shown = lines(&place.say(&["echo", "probe.0", "beat", "--count", "5", "--json"]).ok());
+    let (place, _launch, _robot) = Place::running(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let shown = json_lines(&place.say(&["echo", "probe.0", "beat", "--count", "5", "--json"]).ok());
     assert_eq!(shown.len(), 5);
     for (index, pair) in shown.windows(2).enumerate() {
         assert_eq!(pair[0]["sequence"], index, "{pair:?}");
@@ -31,10 +26,9 @@ fn echo_counts_and_numbers_what_comes() {
 
 #[test]
 fn echo_with_a_rate_shows_the_newest_that_often() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[&probe("probe.0", "rate-hz = 100.0", "")]);
+    let (place, _launch, _robot) = Place::running(&[&probe("probe.0", "rate-hz = 100.0", "")]);
     let start = Instant::now();
-    let shown = lines(&place.say(&["echo", "probe.0", "beat", "--rate", "10", "--count", "6", "--json"]).ok());
+    let shown = json_lines(&place.say(&["echo", "probe.0", "beat", "--rate", "10", "--count", "6", "--json"]).ok());
     let took = start.elapsed().as_secs_f64();
     assert!(took >= 0.45, "6 values 0.1 s apart came within {took} s");
     // Ten beats lie between two of ten a second; a busy computer makes it a few more or less.
@@ -46,34 +40,31 @@ fn echo_with_a_rate_shows_the_newest_that_often() {
 
 #[test]
 fn echo_goes_on_when_its_module_is_restarted_and_ends_by_ctrl_c() {
-    let place = Place::new();
     let restart = "restart = { backoff = \"50 ms\" }";
-    let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", restart)]);
-    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat", "--json"]));
-    let beats = |echo: &Running| lines(echo.out().rsplit_once('\n').map_or("", |(whole, _)| whole));
-    wait("it beats", || (beats(&echo).len() > 20).then_some(()));
-    let pid = robot.pid("probe.0");
-    signal(pid, Signal::SIGKILL);
-    robot.wait_restarted("probe.0", pid);
-    wait("beats of the new incarnation", || {
+    let (place, _launch, robot) = Place::running(&[&probe("probe.0", "rate-hz = 50.0", restart)]);
+    let mut echo = place.start(&["echo", "probe.0", "beat", "--json"]);
+    let beats = |echo: &Running| json_lines(echo.out().rsplit_once('\n').map_or("", |(whole, _)| whole));
+    until("it beats", || beats(&echo).len() > 20);
+    robot.kill("probe.0");
+    until("beats of the new incarnation", || {
         echo.assert_runs();
         // Its numbers begin anew.
         let numbers: Vec<_> = beats(&echo).iter().map(|line| line["sequence"].as_u64()).collect();
-        (!numbers.is_sorted()).then_some(())
+        !numbers.is_sorted()
     });
     echo.stop();
     assert_eq!(echo.err(), "");
-    wait("nobody is subscribed", || {
+    until("nobody is subscribed", || {
         let status = place.say(&["status", "probe.0", "--json"]).json();
-        (status[0]["subscribers"] == 0).then_some(())
+        status[0]["subscribers"] == 0
     });
 }
 
 #[test]
 fn what_modules_say_is_kept_and_filtered() {
-    let place = Place::new();
     let levels = "[output]\nlevels = { \"probe.1\" = \"warn\" }\n";
-    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", ""), levels]);
+    let (place, _launch, _robot) =
+        Place::running(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", ""), levels]);
     for (module, level, text) in [
         ("probe.0", "info", "first"),
         ("probe.0", "debug", "not sent: its level is info"),
@@ -84,11 +75,11 @@ fn what_modules_say_is_kept_and_filtered() {
         call(&place, &[module, "say", level, text]);
     }
     let texts = |arguments: &[&str]| -> Vec<String> {
-        let shown = lines(&place.say(&[&["log", "--json", "--timeout", "60"], arguments].concat()).ok());
+        let shown = json_lines(&place.say(&[&["log", "--json", "--timeout", "60"], arguments].concat()).ok());
         let asked = shown.iter().filter(|line| !is_own(line["text"].as_str().unwrap()));
         asked.map(|line| format!("{} {} {}", line["module"], line["level"], line["text"]).replace('"', "")).collect()
     };
-    wait("all lines", || texts(&[]).iter().any(|line| line.contains("third")).then_some(()));
+    until("all lines", || texts(&[]).iter().any(|line| line.contains("third")));
     assert_eq!(texts(&[]), ["probe.0 info first", "probe.0 warn second", "probe.1 error third"]);
     assert_eq!(texts(&["--level", "warn"]), ["probe.0 warn second", "probe.1 error third"]);
     assert_eq!(texts(&["--level", "error"]), ["probe.1 error third"]);
@@ -96,7 +87,7 @@ fn what_modules_say_is_kept_and_filtered() {
     assert_eq!(texts(&["--module", "probe.0", "--level", "error"]), [""; 0]);
     call(&place, &["probe.0", "output-level", "debug"]);
     call(&place, &["probe.0", "say", "debug", "fourth"]);
-    wait("the debug line", || texts(&[]).contains(&"probe.0 debug fourth".into()).then_some(()));
+    until("the debug line", || texts(&[]).contains(&"probe.0 debug fourth".into()));
     let text = place.say(&["log", "--level", "error", "--timeout", "60"]).ok();
     let (time, rest) = text.split_once(' ').unwrap();
     assert_eq!((time.len(), rest), ("08:36:01.257".len(), "error main/probe.1: third\n"));
@@ -104,9 +95,8 @@ fn what_modules_say_is_kept_and_filtered() {
 
 #[test]
 fn a_log_that_is_followed_shows_lines_as_they_come() {
-    let place = Place::new();
-    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
-    let mut log = Running::start(place.command(&["log", "--follow", "--module", "probe.0"]));
+    let (place, _launch, _robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
+    let mut log = place.start(&["log", "--follow", "--module", "probe.0"]);
     log.wait_for("probe.0: is on");
     for text in ["one", "two", "three"] {
         place.say(&["call", "probe.0", "say", "info", text]).ok();
@@ -118,24 +108,22 @@ fn a_log_that_is_followed_shows_lines_as_they_come() {
 
 #[test]
 fn lines_of_a_module_that_fails_reach_the_log() {
-    let place = Place::new();
     let restart = "restart = { backoff = \"50 ms\" }";
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", restart)]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", restart)]);
     let pid = robot.pid("probe.0");
     place.say(&["call", "probe.0", "leave", "3"]).ok();
     launch.wait_for("probe.0 ended with 3; starts again in 50ms");
     robot.wait_restarted("probe.0", pid);
-    wait("it says twice that it is on", || {
+    until("it says twice that it is on", || {
         let text = place.say(&["log", "--module", "probe.0"]).out;
-        (text.matches("is on").count() == 2).then_some(())
+        text.matches("is on").count() == 2
     });
 }
 
 #[test]
 fn status_shows_each_module() {
-    let place = Place::new();
-    let (_launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);
-    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat"]));
+    let (place, _launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);
+    let mut echo = place.start(&["echo", "probe.0", "beat"]);
     echo.wait_for("\n");
     let status = place.say(&["status", "--json"]).json();
     let module = &status[1];
@@ -150,16 +138,15 @@ fn status_shows_each_module() {
 
 #[test]
 fn what_waits_for_a_module_in_error_says_why_and_ends() {
-    let place = Place::new();
-    let (launch, robot) = launched(&place, RECORD);
+    let (place, launch, robot) = launched(RECORD);
     // Its stream `frame` has the number 2.
     let ring = robot.node.path().join(format!("{:08x}.2.ring", robot.name("feeder.0").raw()));
-    wait("the writer finds the damage", || {
+    until("the writer finds the damage", || {
         let ring = std::fs::File::options().write(true).open(&ring).unwrap();
         // All but what it was made as.
         ring.write_all_at(&vec![0xff; ring.metadata().unwrap().len() as usize - 4096], 4096).unwrap();
         place.say(&["call", "feeder.0", "feed", "100"]);
-        (robot.state("feeder.0") == "error").then_some(())
+        robot.state("feeder.0") == "error"
     });
     for words in [
         &["echo", "feeder.0", "count"][..],
@@ -172,7 +159,6 @@ fn what_waits_for_a_module_in_error_says_why_and_ends() {
         assert!(said.code == Some(1) && said.err.contains(why), "{words:?}: {said:?}");
         assert!(said.err.contains("stream `frame` of feeder.0 is damaged"), "{words:?}: {said:?}");
     }
-    drop(robot);
     launch.signal(Signal::SIGINT);
     assert_eq!(launch.said().code, Some(1), "a module is in error");
 }

@@ -1,6 +1,6 @@
 //! `rohrpost top`, used as a person uses it: keys, and what is on the screen then.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, signal, until};
 use crate::process::Running;
 use crate::terminal::Terminal;
 use nix::sys::signal::Signal;
@@ -10,9 +10,19 @@ use std::process::Stdio;
 /// Top refreshes often, so that tests need not wait.
 const TOP: [&str; 3] = ["top", "--interval", "0.2"];
 
-fn robot(place: &Place) -> (Running, Robot) {
+fn robot() -> (Place, Running, Robot) {
     let never = "restart = { policy = \"never\" }";
-    place.launched(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", ""), &probe("probe.1", "", never)])
+    Place::running(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", ""), &probe("probe.1", "", never)])
+}
+
+/// A robot, and `top` in a terminal of this size, which shows all its modules.
+fn shown(rows: u16, columns: u16) -> (Place, Running, Robot, Terminal, Running) {
+    let (place, launch, robot) = robot();
+    let (terminal, top) = Terminal::start(&place, &TOP, rows, columns);
+    for module in ["output.0", "probe.0", "probe.1"] {
+        terminal.wait_row(module, &["on"]);
+    }
+    (place, launch, robot, terminal, top)
 }
 
 fn end(mut top: Running, terminal: &Terminal) {
@@ -24,12 +34,7 @@ fn end(mut top: Running, terminal: &Terminal) {
 
 #[test]
 fn modules_are_selected_switched_sorted_and_filtered_by_keys() {
-    let place = Place::new();
-    let (mut launch, robot) = robot(&place);
-    let (terminal, top) = Terminal::start(&place, &TOP, 24, 80);
-    for module in ["output.0", "probe.0", "probe.1"] {
-        terminal.wait_row(module, &["on"]);
-    }
+    let (place, mut launch, robot, terminal, top) = shown(24, 80);
     terminal.wait_screen("the head", |screen| screen.starts_with("test.main") && screen.contains("3 modules: 3 on"));
     terminal.keys("j");
     terminal.wait_screen("the mark at probe.0", |screen| screen.contains("> probe.0"));
@@ -63,17 +68,12 @@ fn modules_are_selected_switched_sorted_and_filtered_by_keys() {
     terminal.keys("p");
     terminal.wait_screen("a pause", |screen| screen.contains("PAUSED"));
     end(top, &terminal);
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn all_keys_move_the_mark_and_a_pause_stands_still() {
-    let place = Place::new();
-    let (_launch, robot) = robot(&place);
-    let (terminal, top) = Terminal::start(&place, &TOP, 24, 100);
-    terminal.wait_row("probe.1", &["on"]);
+    let (place, _launch, robot, terminal, top) = shown(24, 100);
     let (down, up, home, end_key) = ("\x1b[B", "\x1b[A", "\x1b[H", "\x1b[F");
     for (keys, marked) in [
         (down, "probe.0"),
@@ -108,7 +108,7 @@ fn all_keys_move_the_mark_and_a_pause_stands_still() {
     for keys in [home, end_key, home, end_key] {
         let drawn = terminal.drawn().len();
         terminal.keys(keys);
-        wait("it draws", || (terminal.drawn().len() > drawn).then_some(()));
+        until("it draws", || terminal.drawn().len() > drawn);
     }
     terminal.wait_screen("the mark at the end", |screen| screen.contains("> probe.1 "));
     let paused = terminal.screen();
@@ -121,11 +121,8 @@ fn all_keys_move_the_mark_and_a_pause_stands_still() {
 
 #[test]
 fn details_show_mailboxes_and_what_the_module_says_of_itself() {
-    let place = Place::new();
-    let (_launch, _robot) = robot(&place);
+    let (place, _launch, _robot, terminal, top) = shown(120, 100);
     place.say(&["call", "probe.0", "count", "1"]).ok();
-    let (terminal, top) = Terminal::start(&place, &TOP, 120, 100);
-    terminal.wait_row("probe.0", &["on"]);
     terminal.keys("j\r");
     for words in
         ["Does what tests ask of it", "probe.0 commands", "how long packages waited", "data beat: u64", "receives from"]
@@ -148,11 +145,8 @@ fn details_show_mailboxes_and_what_the_module_says_of_itself() {
 
 #[test]
 fn a_module_is_restarted_only_after_yes() {
-    let place = Place::new();
-    let (_launch, robot) = robot(&place);
+    let (place, _launch, robot, terminal, top) = shown(24, 80);
     let pid = robot.pid("probe.0");
-    let (terminal, top) = Terminal::start(&place, &TOP, 24, 80);
-    terminal.wait_row("probe.0", &["on"]);
     terminal.keys("jr");
     terminal.wait_screen("the question", |screen| screen.contains("restart probe.0? y/n"));
     terminal.keys("n");
@@ -167,10 +161,7 @@ fn a_module_is_restarted_only_after_yes() {
 
 #[test]
 fn a_death_is_seen_and_said() {
-    let place = Place::new();
-    let (_launch, robot) = robot(&place);
-    let (terminal, top) = Terminal::start(&place, &TOP, 24, 160);
-    terminal.wait_row("probe.1", &["on"]);
+    let (_place, _launch, robot, terminal, top) = shown(24, 160);
     let pid = robot.pid("probe.0");
     signal(robot.pid("probe.1"), Signal::SIGKILL);
     terminal.wait_row("probe.1", &["failed"]);
@@ -185,9 +176,7 @@ fn a_death_is_seen_and_said() {
 
 #[test]
 fn what_modules_say_is_followed_and_filtered() {
-    let place = Place::new();
-    let (_launch, _robot) = robot(&place);
-    let (terminal, top) = Terminal::start(&place, &TOP, 24, 100);
+    let (place, _launch, _robot, terminal, top) = shown(24, 100);
     terminal.wait_screen("what was said before", |screen| screen.contains("probe.0: is on"));
     place.say(&["call", "probe.0", "say", "warn", "a line of zero"]).ok();
     place.say(&["call", "probe.1", "say", "info", "a line of one"]).ok();
@@ -207,10 +196,7 @@ fn what_modules_say_is_followed_and_filtered() {
 
 #[test]
 fn a_module_that_hangs_does_not_freeze_the_screen() {
-    let place = Place::new();
-    let (_launch, robot) = robot(&place);
-    let (terminal, top) = Terminal::start(&place, &TOP, 24, 80);
-    terminal.wait_row("probe.0", &["on"]);
+    let (_place, _launch, robot, terminal, top) = shown(24, 80);
     let pid = robot.pid("probe.0");
     halt(pid);
     terminal.keys("jf");
@@ -225,11 +211,8 @@ fn a_module_that_hangs_does_not_freeze_the_screen() {
 
 #[test]
 fn a_module_in_error_says_why() {
-    let place = Place::new();
-    let config = place.config(&[&probe("probe.0", "refuse-on = true", "")]);
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    wait("it is in error", || (robot.state("probe.0") == "error").then_some(()));
+    let (place, _launch, robot) = Place::begun(&[&probe("probe.0", "refuse-on = true", "")]);
+    until("it is in error", || robot.state("probe.0") == "error");
     let (terminal, top) = Terminal::start(&place, &TOP, 24, 160);
     terminal.wait_row("probe.0", &["error"]);
     terminal.wait_screen("why", |screen| screen.contains("a probe was asked not to work"));
@@ -242,14 +225,11 @@ fn a_module_in_error_says_why() {
 
 #[test]
 fn any_size_will_do() {
-    let place = Place::new();
-    let (_launch, _robot) = robot(&place);
-    let (terminal, top) = Terminal::start(&place, &TOP, 24, 80);
-    terminal.wait_row("probe.0", &["on"]);
+    let (_place, _launch, _robot, terminal, top) = shown(24, 80);
     for (rows, columns) in [(12, 40), (1, 1), (2, 7), (100, 300), (24, 80)] {
         let before = terminal.drawn().len();
         terminal.resize(&top, rows, columns);
-        wait("it is drawn anew", || (terminal.drawn().len() > before).then_some(()));
+        until("it is drawn anew", || terminal.drawn().len() > before);
     }
     terminal.resize(&top, 12, 40);
     // The larger drawing is cut at first, and has this column.
@@ -264,8 +244,7 @@ fn any_size_will_do() {
 
 #[test]
 fn signals_and_control_c_give_the_terminal_back() {
-    let place = Place::new();
-    let (_launch, _robot) = robot(&place);
+    let (place, _launch, _robot) = robot();
     for how in [Some(Signal::SIGTERM), Some(Signal::SIGINT), Some(Signal::SIGHUP), None] {
         let (terminal, mut top) = Terminal::start(&place, &TOP, 24, 80);
         terminal.wait_row("probe.0", &["on"]);
@@ -280,18 +259,14 @@ fn signals_and_control_c_give_the_terminal_back() {
 
 #[test]
 fn a_terminal_that_is_closed_ends_it() {
-    let place = Place::new();
-    let (_launch, _robot) = robot(&place);
-    let (terminal, mut top) = Terminal::start(&place, &TOP, 24, 80);
-    terminal.wait_row("probe.0", &["on"]);
+    let (_place, _launch, _robot, terminal, mut top) = shown(24, 80);
     terminal.close();
     top.end();
 }
 
 #[test]
 fn without_colours_the_words_are_the_same() {
-    let place = Place::new();
-    let (_launch, _robot) = robot(&place);
+    let (place, _launch, _robot) = robot();
     let coloured = |drawn: &str| drawn.contains("\x1b[38;5;2;");
     let (terminal, top) = Terminal::start(&place, &TOP, 24, 80);
     terminal.wait_row("probe.0", &["on"]);
@@ -305,8 +280,7 @@ fn without_colours_the_words_are_the_same() {
 
 #[test]
 fn looking_sends_nothing_to_those_it_looks_at() {
-    let place = Place::new();
-    let (_launch, robot) = robot(&place);
+    let (place, _launch, robot) = robot();
     let traffic = |module: &str| {
         let all = robot.node.mailboxes().unwrap().into_iter().filter(|name| name.module() == robot.name(module));
         let all = all.filter_map(|name| robot.node.look_at(name));
@@ -318,7 +292,7 @@ fn looking_sends_nothing_to_those_it_looks_at() {
     let drawn = terminal.drawn().len();
     terminal.keys("j\r");
     terminal.wait_screen("the description", |screen| screen.contains("probe.0: on"));
-    wait("some looks later", || (terminal.drawn().len() > drawn + 2000).then_some(()));
+    until("some looks later", || terminal.drawn().len() > drawn + 2000);
     end(top, &terminal);
     place.say(&["top", "--json", "--interval", "0.1"]).json();
     assert_eq!(["probe.0", "probe.1"].map(traffic), before);
@@ -326,22 +300,18 @@ fn looking_sends_nothing_to_those_it_looks_at() {
 
 #[test]
 fn it_waits_for_a_node_to_be_launched_again() {
-    let place = Place::new();
-    let (mut launch, robot) = robot(&place);
+    let (place, mut launch, robot) = robot();
     let config = robot.installation.path.clone();
     let (terminal, top) = Terminal::start(&place, &TOP, 24, 80);
     terminal.wait_row("probe.0", &["on"]);
     // Stopped before all modules are on, launch reports a failed start.
     let mut tool = robot.tool(PATIENCE);
     let through = |children: Vec<ChildState>| children.iter().all(|child| child.phase == Phase::Running);
-    wait("launch is through with all", || through(tool.children(tool.launcher()).unwrap()).then_some(()));
+    until("launch is through with all", || through(tool.children(tool.launcher()).unwrap()));
     tool.close();
-    drop(robot);
     launch.stop();
     terminal.wait_screen("that launch is gone", |screen| screen.contains("NOT LAUNCHED"));
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (_launch, _robot) = place.launched_from(&config);
     terminal.wait_row("probe.0", &["on"]);
     terminal.wait_screen("launched", |screen| !screen.contains("NOT LAUNCHED"));
     terminal.keys("jf");
@@ -351,8 +321,7 @@ fn it_waits_for_a_node_to_be_launched_again() {
 
 #[test]
 fn programs_get_one_object_and_pipes_one_table() {
-    let place = Place::new();
-    let (_launch, robot) = robot(&place);
+    let (place, _launch, robot) = robot();
     let json = place.say(&["top", "--json", "--interval", "0.5"]).json();
     assert_eq!(
         (&json["installation"], &json["node"], &json["launched"]),
@@ -375,10 +344,8 @@ fn programs_get_one_object_and_pipes_one_table() {
     assert!(table.contains("probe.0") && table.contains("memory") && !table.contains('\x1b'), "{table}");
     let mut command = place.command(&["top"]);
     command.stdin(Stdio::null());
-    let told = Running::start(command).said().fails();
-    assert!(told.contains("use `top --once` or `top --json`"), "{told}");
+    Running::start(command).said().fails_with(["use `top --once` or `top --json`"]);
     for interval in ["0", "-1", "nan", "1e9"] {
-        let told = place.say(&["top", "--json", &format!("--interval={interval}")]).fails();
-        assert!(told.contains("it takes 0.1 to 3600"), "{told}");
+        place.say(&["top", "--json", &format!("--interval={interval}")]).fails_with(["it takes 0.1 to 3600"]);
     }
 }

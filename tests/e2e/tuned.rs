@@ -1,7 +1,7 @@
 //! A module with parameters of every kind, for tests of `rohrpost param`. Like the probe it is this test program
 //! itself.
 
-use crate::harness::program;
+use crate::harness::{program, run_if_launched};
 use crate::process::Said;
 use rohrpost::parameter::ParameterSet;
 use rohrpost::{Context, Module, ModuleError};
@@ -16,10 +16,7 @@ pub(crate) fn tuned(name: &str, settings: &str, keys: &str) -> String {
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {
-    if std::env::var_os("ROHRPOST_MODULE").is_some() {
-        let code = rohrpost::run::<Tuned>();
-        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS) * 78);
-    }
+    run_if_launched::<Tuned>();
 }
 
 /// Where it looks first.

@@ -22,8 +22,7 @@ fn node_file(robot: &Robot) -> std::path::PathBuf {
 
 #[test]
 fn every_tool_says_that_a_node_is_of_another_version() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let config = place.path("test.toml");
     let config = config.to_str().unwrap();
     let length = node_file(&robot).metadata().unwrap().len();
@@ -46,43 +45,36 @@ fn every_tool_says_that_a_node_is_of_another_version() {
     assert_eq!(node_file(&robot).metadata().unwrap().len(), length, "it was left as it is");
     write_version(&node_file(&robot), LAYOUT_VERSION);
     place.say(&["status"]).ok();
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn a_mailbox_of_another_version_is_told_from_a_broken_one() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let mailbox = robot.node.path().join(format!("{:08x}.mbx", robot.name("probe.0").raw()));
     write_version(&mailbox, OTHER);
-    let told = place.say(&["call", "probe.0", "count", "1"]).fails();
-    assert!(told.contains(&format!("another version (layout {OTHER}, this program {LAYOUT_VERSION})")), "{told}");
+    let said = place.say(&["call", "probe.0", "count", "1"]);
+    said.fails_with([&format!("another version (layout {OTHER}, this program {LAYOUT_VERSION})")]);
     write_version(&mailbox, LAYOUT_VERSION);
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn what_launch_of_another_version_noted_is_not_guessed_at() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let noted = robot.node.path().join(rohrpost_launch::CONFIG_FILE);
     let text = std::fs::read_to_string(&noted).unwrap();
     std::fs::write(&noted, "{ \"something\": \"else\" }").unwrap();
-    let told = place.say(&["list"]).fails();
-    assert!(told.contains("was written by another version of launch; say --config FILE"), "{told}");
+    place.say(&["list"]).fails_with(["was written by another version of launch; say --config FILE"]);
     place.say(&["list", "--config", place.path("test.toml").to_str().unwrap()]).ok();
     std::fs::write(&noted, text).unwrap();
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
 fn a_program_of_other_common_functions_is_told_both_versions() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     for function in [common::STATUS, common::DESCRIBE, common::PARAMETERS] {
         let told = tool.call(robot.name("probe.0"), function, common::HASH - 1, |_| Ok(()), |_| Ok(())).unwrap_err();
@@ -90,8 +82,7 @@ fn a_program_of_other_common_functions_is_told_both_versions() {
         assert!(told.to_string().contains(&both), "{told}");
     }
     tool.close();
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]

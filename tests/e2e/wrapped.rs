@@ -1,8 +1,7 @@
 //! What stands around a module's process: a script that starts it, `nohup`, a container without an init.
 
 use crate::all_nodes::below;
-use crate::harness::{Place, probe, runs, signal, state, wait};
-use crate::process::Running;
+use crate::harness::{Place, probe, runs, signal, state, until, wait};
 use crate::strangers::{contained, launched_in, named};
 use nix::sys::signal::Signal;
 use std::path::Path;
@@ -19,8 +18,7 @@ const WAITS: &str = r#""$0" "$@"; exit $?"#;
 
 #[test]
 fn a_module_behind_a_script_is_the_process_that_launch_means() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&behind(WAITS, 1, "")]);
+    let (place, mut launch, robot) = Place::running(&[&behind(WAITS, 1, "")]);
     let first = robot.pid("probe.0");
     let told = place.say(&["restart", "probe.0"]).ok();
     let second = robot.wait_restarted("probe.0", first).pid;
@@ -29,7 +27,6 @@ fn a_module_behind_a_script_is_the_process_that_launch_means() {
     signal(second, Signal::SIGKILL);
     launch.wait_for("probe.0 ended with 137; starts again");
     robot.wait_restarted("probe.0", second);
-    drop(robot);
     let (pid, all) = (launch.pid(), below(launch.pid()));
     assert_eq!(all.len(), 2, "the script and the module of {pid}");
     let said = launch.stop();
@@ -40,29 +37,25 @@ fn a_module_behind_a_script_is_the_process_that_launch_means() {
 
 #[test]
 fn a_module_behind_scripts_switches_off_when_launch_is_killed() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&behind(WAITS, 2, "")]);
+    let (place, mut launch, robot) = Place::running(&[&behind(WAITS, 2, "")]);
     let pid = robot.pid("probe.0");
-    launch.signal(Signal::SIGKILL);
-    launch.end();
-    wait("the module ends", || (!runs(pid)).then_some(()));
+    launch.kill();
+    until("the module ends", || !runs(pid));
     assert_eq!(place.recorded("off"), 1);
 }
 
 #[test]
 fn what_a_module_has_started_ends_with_it() {
-    let place = Place::new();
     let keys = "restart = { backoff = \"10 ms\" }";
-    let (mut launch, robot) = place.launched(&[&behind(r#"sleep 600 & exec "$0" "$@""#, 1, keys)]);
+    let (place, mut launch, robot) = Place::running(&[&behind(r#"sleep 600 & exec "$0" "$@""#, 1, keys)]);
     let helper = || wait("a helper", || named(&launch, "sleep").first().copied());
     let (pid, first) = (robot.pid("probe.0"), helper());
     signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.0", pid);
-    wait("the helper of the first one ends", || (!runs(first)).then_some(()));
+    until("the helper of the first one ends", || !runs(first));
     let second = helper();
-    drop(robot);
     launch.stop();
-    wait("the helper of the second one ends", || (!runs(second)).then_some(()));
+    until("the helper of the second one ends", || !runs(second));
     place.assert_empty();
 }
 
@@ -74,9 +67,7 @@ fn under_nohup_a_terminal_that_goes_ends_nobody() {
     let mut command = Command::new("nohup");
     command.arg(launch.get_program()).args(launch.get_args()).env("ROHRPOST_DIR", place.memory());
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut launch = Running::start(command);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (mut launch, robot) = place.up(command, &config, "main");
     for pid in [launch.pid(), robot.pid("probe.0")] {
         let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
         let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap();
@@ -85,9 +76,7 @@ fn under_nohup_a_terminal_that_goes_ends_nobody() {
         signal(pid, Signal::SIGHUP);
     }
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
-    drop(robot);
-    launch.stop();
-    place.assert_empty();
+    place.end(&mut launch);
 }
 
 #[test]
@@ -101,7 +90,7 @@ fn as_the_first_process_of_a_container_launch_leaves_no_zombies() {
     let first = robot.process("probe.0").unwrap().incarnation;
     let is_zombie = |pid: &u32| state(Path::new(&format!("/proc/{pid}/stat"))) == 'Z';
     let zombies = || named(&container, "sleep").into_iter().filter(is_zombie).count();
-    wait("none is left", || (zombies() == 0).then_some(()));
+    until("none is left", || zombies() == 0);
     // Its own children it hears of as ever.
     place.say(&["call", "probe.0", "leave", "3"]).ok();
     container.wait_for("probe.0 ended with 3; starts again");

@@ -23,6 +23,10 @@ impl Launched {
         Self { folder: folder.into(), launch }
     }
 
+    pub(crate) fn pid(&self) -> u32 {
+        self.launch.id()
+    }
+
     /// Runs a tool to its end.
     pub(crate) fn tool(&self, arguments: &[&str]) -> Output {
         command(&self.folder, arguments).output().unwrap()

@@ -1,5 +1,6 @@
 //! A robot that measures itself, and its configuration. Its modules are in `modules`.
 
+use super::launched::Launched;
 use super::modules::{BEAT, Mark, ReceivingInterface, SendingInterface, Times};
 use super::programs::bridge;
 use rohrpost::common::GET_DATA;
@@ -9,31 +10,14 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Name, ToolLink};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{MailboxInfo, ModuleState, Node, StreamId, StreamInfo, node_directory};
+pub(crate) use rohrpost_testbed::report::{PATIENCE, until, wait};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 use tempfile::TempDir;
-
-/// Limit of all waits, long enough for a busy computer.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
-
-/// Waits until there is a value, and fails with the name of what was awaited.
-#[track_caller]
-pub(crate) fn wait<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let start = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(start.elapsed() < PATIENCE, "waited {PATIENCE:?} in vain: {what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
 
 /// The robot, running, with a bridge that draws.
 pub(crate) struct Robot {
-    launch: Child,
+    launched: Launched,
     tool: ToolLink,
     node: Arc<Node>,
     installation: Installation,
@@ -47,24 +31,16 @@ impl Robot {
         let config = memory.path().join("robot.toml");
         std::fs::write(&config, configuration(drawing, settings)).unwrap();
         let installation = Installation::load(&config).unwrap();
-        let launch = Command::new(env!("CARGO_BIN_EXE_rohrpost"))
-            .args(["launch", "robot.toml"])
-            .env("ROHRPOST_DIR", memory.path().join("nodes"))
-            .current_dir(memory.path())
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let launched = Launched::start(memory.path(), "robot.toml");
         let base = node_directory(&installation.name, "main");
         let path = memory.path().join("nodes").join(base.file_name().unwrap());
-        let node = wait("the node", || Node::open(&path).ok().filter(|node| node.launcher() == Some(launch.id())));
-        wait("all modules are on", || {
+        let node = wait("the node", || Node::open(&path).ok().filter(|node| node.launcher() == Some(launched.pid())));
+        until("all modules are on", || {
             let on = node.participants().into_iter().filter(|p| p.state == Some(ModuleState::On)).count();
-            (on == 4).then_some(())
+            on == 4
         });
         let tool = ToolLink::join(&installation, &node, "main", PATIENCE).unwrap();
-        Self { launch, tool, node, installation, memory }
+        Self { launched, tool, node, installation, memory }
     }
 
     fn name(&self, module: &str) -> Name {
@@ -168,27 +144,11 @@ impl Robot {
 
     /// A tool's output.
     pub(crate) fn say(&self, arguments: &[&str]) -> String {
-        let mut tool = Command::new(env!("CARGO_BIN_EXE_rohrpost"));
-        let output = tool.args(arguments).env("ROHRPOST_DIR", self.memory.path().join("nodes")).output().unwrap();
-        String::from_utf8_lossy(&output.stdout).into_owned()
+        String::from_utf8_lossy(&self.launched.tool(arguments).stdout).into_owned()
     }
 
     pub(crate) fn folder(&self) -> &Path {
         self.memory.path()
-    }
-}
-
-impl Drop for Robot {
-    fn drop(&mut self) {
-        // Asked to end first, so that its modules end; then killed.
-        let pid = nix::unistd::Pid::from_raw(self.launch.id() as i32);
-        let _ = nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM);
-        let start = Instant::now();
-        while self.launch.try_wait().is_ok_and(|ended| ended.is_none()) && start.elapsed() < PATIENCE {
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        let _ = self.launch.kill();
-        let _ = self.launch.wait();
     }
 }
 

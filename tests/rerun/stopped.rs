@@ -1,7 +1,7 @@
 //! The bridge itself is stopped for a while, as on a computer that is too busy, and goes on.
 
 use super::programs::{printed, rows, times_ns};
-use super::robot::{Robot, wait};
+use super::robot::{Robot, until, wait};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost_mailbox::{ClassTraffic, Loss, OverflowPolicy, local};
@@ -24,22 +24,22 @@ fn is_stopped(pid: u32) -> bool {
 fn a_bridge_that_stood_still_goes_on_with_the_newest() {
     let mut robot = Robot::start("file = \"robot.rrd\"", "");
     let file = robot.folder().join("robot.rrd");
-    wait("scans are drawn", || (!times_ns(&file, SCAN).is_empty()).then_some(()));
+    until("scans are drawn", || !times_ns(&file, SCAN).is_empty());
 
     let pid = robot.bridge_pid();
     let signal = |signal| kill(Pid::from_raw(pid as i32), signal).unwrap();
     signal(Signal::SIGSTOP);
-    wait("the bridge stands still", || is_stopped(pid).then_some(()));
+    until("the bridge stands still", || is_stopped(pid));
     let stopped_ns = robot.newest_scan_ns();
     // A published value with a later value that was sent has been sent itself, however slow the computer is.
     let (mut continued_ns, mut last) = (stopped_ns, (stopped_ns, u64::MAX));
-    wait("patches wait", || {
+    until("patches wait", || {
         let sent = robot.bridge_mailbox(NEWEST).sent;
         if sent > last.1 {
             continued_ns = last.0;
         }
         last = (robot.newest_scan_ns(), robot.bridge_mailbox(NEWEST).sent);
-        (robot.bridge_mailbox(local::DATA).depth >= WAITING).then_some(())
+        robot.bridge_mailbox(local::DATA).depth >= WAITING
     });
     assert!(continued_ns > stopped_ns, "scans were sent meanwhile");
     signal(Signal::SIGCONT);
@@ -51,9 +51,9 @@ fn a_bridge_that_stood_still_goes_on_with_the_newest() {
     let first = drawn.into_iter().find(|ns| *ns > stopped_ns).unwrap();
     let late_s = continued_ns.saturating_sub(first) as f64 / 1e9;
     assert!(first >= continued_ns, "the first scan after the stop was {late_s:.3} s old; the newest was there");
-    wait("the map is whole", || {
+    until("the map is whole", || {
         let rows = rows(&printed(&file, &[]));
-        (rows.keys().filter(|entity| entity.starts_with("/world/map/source.0/")).count() == PATCHES).then_some(())
+        rows.keys().filter(|entity| entity.starts_with("/world/map/source.0/")).count() == PATCHES
     });
 
     let [newest, each] = [NEWEST, local::DATA].map(|local| robot.bridge_mailbox(local));

@@ -3,7 +3,7 @@
 
 use super::launched::Launched;
 use super::programs::{bridge, ok, rerun, rows, rrd};
-use super::robot::wait;
+use super::robot::{until, wait};
 use rohrpost::interfaces::{Cartographer, CartographerInterface, MapCounts};
 use rohrpost::serde::Deserialize;
 use rohrpost::types::{OccupancyGrid, Pose};
@@ -110,7 +110,7 @@ fn a_drawing_that_is_switched_on_again_is_whole_and_the_last_one_is_kept() {
     let enough = |launch: &Launched| wait("something is drawn", || (launch.count("drawn")? > 100).then_some(()));
     enough(&launch);
     ok("off", &launch.tool(&["call", "gui.0", "off"]));
-    wait("the first ends", || std::fs::read(&file).unwrap().windows(4).any(|mark| mark == b"FOOT").then_some(()));
+    until("the first ends", || std::fs::read(&file).unwrap().windows(4).any(|mark| mark == b"FOOT"));
     ok("on", &launch.tool(&["call", "gui.0", "on"]));
     enough(&launch);
     let said = launch.end();
@@ -138,9 +138,9 @@ fn settings_that_cannot_be_are_refused_with_what_can() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("map.toml"), configuration(settings)).unwrap();
         let launch = Launched::start(folder.path(), "map.toml");
-        wait(why, || {
+        until(why, || {
             let log = launch.tool(&["log", "--module", "gui.0"]);
-            String::from_utf8_lossy(&log.stdout).contains(why).then_some(())
+            String::from_utf8_lossy(&log.stdout).contains(why)
         });
     }
 }

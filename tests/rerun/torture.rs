@@ -14,7 +14,7 @@
 
 use super::load::{Load, on_one_processor};
 use super::modules::Mark;
-use super::robot::{Robot, wait};
+use super::robot::{Robot, until};
 use super::viewer::{Viewer, free_port};
 use rohrpost_testbed::stalls::{Late, Stalls, unless_stalled};
 use std::time::{Duration, Instant};
@@ -107,9 +107,9 @@ impl<'a> Test<'a> {
         assert_eq!(self.robot.pictures().readers, 1, "the bridge reads it");
         let written = self.robot.pictures().written;
         // It may just be copying one.
-        wait("no picture is held while others are written", || {
+        until("no picture is held while others are written", || {
             let pictures = self.robot.pictures();
-            (pictures.written > written + 1 && pictures.holding == 0).then_some(())
+            pictures.written > written + 1 && pictures.holding == 0
         });
     }
 

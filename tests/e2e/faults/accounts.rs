@@ -20,7 +20,8 @@ const CALL: Duration = Duration::from_millis(900);
 #[test]
 fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
     let Some(mut field) = Field::new(2, "") else { return };
-    field.launch(&["base", "arm"], &[("ROHRPOST_IMPAIR", IMPAIR)]);
+    field.network.impair = IMPAIR;
+    field.launch(&["base", "arm"]);
     let mut sink = Sink::new(field.robot("arm"), "arm");
     let mut source = Source::new(field.robot("base"), "base", "arm", PLAIN);
     // A younger server cannot tell whether its predecessor has run a repeated call, and answers that the outcome is

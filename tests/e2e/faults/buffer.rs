@@ -2,7 +2,7 @@
 
 use super::Field;
 use super::flow::{ALONE_BYTES, PLAIN, Sink, Source, URGENT, balance, carried, lost};
-use crate::harness::{halt, signal, wait};
+use crate::harness::{halt, signal, until, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::LinkState;
 use std::time::Duration;
@@ -10,21 +10,21 @@ use std::time::Duration;
 #[test]
 fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_after_them_come() {
     let Some(mut field) = Field::new(2, "rate = \"4 GiB\"") else { return };
-    field.launch(&["base", "arm"], &[]);
+    field.launch(&["base", "arm"]);
     let mut sink = Sink::new(field.robot("arm"), "arm");
     let mut flood = Source::new(field.robot("base"), "base", "arm", PLAIN);
     let router = field.router("arm");
     // Datagrams of the base before the arm listened count as lost; the first one that the arm receives, at either
     // port, shows that it listens.
     field.wait_for_state("arm", "base", LinkState::Alive);
-    wait("the first of the flow", || {
+    until("the first of the flow", || {
         flood.send();
         sink.take(Duration::from_millis(10));
-        (!sink.came.is_empty()).then_some(())
+        !sink.came.is_empty()
     });
     let before = field.peer("arm", "base").counters.lost;
     // A busy computer may fail to flood it in the second until it counts as silent; then it tries again.
-    wait("the buffer runs over", || {
+    until("the buffer runs over", || {
         field.wait_for_state("base", "arm", LinkState::Alive);
         halt(router);
         for _ in 0..20 {
@@ -43,7 +43,7 @@ fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_afte
         let over = field.dropped("arm") > 0;
         signal(router, Signal::SIGCONT);
         sink.take(Duration::from_millis(1));
-        over.then_some(())
+        over
     });
     let accounts = balance(&field, &flood, &mut sink, PLAIN);
     let dropped = field.dropped("arm");

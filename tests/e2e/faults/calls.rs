@@ -1,7 +1,7 @@
 //! Calls from one node to another, and the proof that none ran twice.
 
 use super::Field;
-use crate::harness::wait;
+use crate::harness::until;
 use crate::probe::{COUNT, ProbingInterface};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Name, ToolLink};
@@ -52,7 +52,7 @@ impl Calls {
 
     /// Waits until each is answered, or has timed out.
     pub(super) fn settle(&mut self) {
-        wait("calls end", || (self.look() == 0).then_some(()));
+        until("calls end", || self.look() == 0);
     }
 
     /// Stops waiting for them, and repeats none.

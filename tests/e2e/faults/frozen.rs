@@ -2,7 +2,7 @@
 
 use super::calls::Calls;
 use super::{AT_ONCE, Field, TRANSIT_MAX};
-use crate::harness::{PATIENCE, halt, signal, wait};
+use crate::harness::{PATIENCE, halt, signal, until};
 use nix::sys::signal::Signal;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
@@ -16,7 +16,7 @@ fn grow_old(field: &Field, node: &str, module: &str, numbers: std::ops::Range<u3
     let begun = Instant::now();
     let mut calls = Calls::new(field, node, module, PATIENCE);
     numbers.for_each(|number| calls.begin(number));
-    wait("they are old", || (begun.elapsed() > FROZEN).then_some(()));
+    until("they are old", || begun.elapsed() > FROZEN);
     calls.forget();
     calls.close();
 }

@@ -3,7 +3,7 @@
 use super::calls::{Calls, assert_once};
 use super::flow::{BULK, Sink, Source};
 use super::{Field, router_of};
-use crate::harness::{runs, signal, wait};
+use crate::harness::{runs, signal, times, until};
 use nix::sys::signal::Signal;
 use rohrpost::{CallError, Class, Fault};
 use rohrpost_mailbox::{Loss, local};
@@ -24,11 +24,6 @@ const TOO_LATE: Duration = Duration::from_nanos(WAIT_MAX_NS);
 const WAITING: usize = rohrpost_modules::call::REPLIES_KEPT;
 /// These are repeated several times meanwhile.
 const MANY_TRIES: Duration = Duration::from_millis(900);
-
-/// How often: for a long run, `ROHRPOST_FAULT_ROUNDS=1000 cargo test --test e2e faults::killed`.
-fn rounds() -> u32 {
-    std::env::var("ROHRPOST_FAULT_ROUNDS").ok().map_or(10, |rounds| rounds.parse().unwrap())
-}
 
 /// Numbered data from node to node, a thousand a second, all the time. They fill the mailbox of a dead router, and give
 /// way there to more important packages.
@@ -82,12 +77,13 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
     let traffic = [Traffic::new(&field, "base", "arm"), Traffic::new(&field, "arm", "base")];
     let mut numbers = 0..;
     let mut answers = [Vec::new(), Vec::new()];
-    for round in 0..rounds() {
+    // For a long run: `ROHRPOST_FAULT_ROUNDS=1000 cargo test --test e2e faults::killed`.
+    for round in 0..times("ROHRPOST_FAULT_ROUNDS", 10) {
         // The other node's probe is called, so that commands wait in the mailbox of the killed router.
         let (node, other, probe) = if round % 2 == 0 { ("base", "arm", 1) } else { ("arm", "base", 0) };
         let (before, stale_before) = (field.peer(other, node).counters.restarts, stale(&field, node));
         // The pause before a restart grows if there were others within a second.
-        wait(format!("{node} ran for a while"), || (field.links(node).uptime_ms > 1000).then_some(()));
+        until(format!("{node} ran for a while"), || field.links(node).uptime_ms > 1000);
         let module = format!("probe.{probe}");
         let mut under_way = Calls::new(&field, node, &module, MANY_TRIES);
         let mut waiting = Calls::new(&field, node, &module, 3 * ONE_TRY);
@@ -95,7 +91,7 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
         numbers.by_ref().take(6).for_each(|number| under_way.begin(number));
         signal(pid, Signal::SIGKILL);
         let killed = Instant::now();
-        wait(format!("{pid} is gone"), || (!runs(pid)).then_some(()));
+        until(format!("{pid} is gone"), || !runs(pid));
         numbers.by_ref().take(WAITING).for_each(|number| waiting.begin(number));
         waiting.settle();
         let took = killed.elapsed();
@@ -119,7 +115,7 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
         answers[probe].extend(waiting.close());
         answers[probe].extend(under_way.close());
         field.robot(node).wait_restarted(&router_of(node), pid);
-        wait(format!("{other} has heard of it"), || (field.peer(other, node).counters.restarts > before).then_some(()));
+        until(format!("{other} has heard of it"), || field.peer(other, node).counters.restarts > before);
     }
     field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
     field.wait_told("router.1", &["the router of node base", "was started anew"], 1);

@@ -1,7 +1,7 @@
 //! The master of time dies, and comes back.
 
 use super::{Field, router_of};
-use crate::harness::{halt, runs, signal, wait};
+use crate::harness::{halt, runs, signal, until, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, RouterInterface};
 use rohrpost_mailbox::{SystemClock, SystemTime, monotonic_ns};
@@ -53,9 +53,9 @@ impl Reader {
     /// Waits until it has read some more.
     fn go_on(&self) {
         let enough = self.readings.load(Ordering::Relaxed) + READINGS;
-        wait("readings of time", || {
+        until("readings of time", || {
             let ended = self.thread.is_finished();
-            (ended || self.readings.load(Ordering::Relaxed) >= enough).then_some(())
+            ended || self.readings.load(Ordering::Relaxed) >= enough
         });
     }
 
@@ -101,7 +101,7 @@ fn agreed(field: &Field, nodes: &[&str]) -> (String, u64) {
 fn when_the_master_dies_the_next_takes_over_and_no_node_s_time_goes_back_or_leaves_its_bound() {
     unless_stalled(|stalls| {
         let Some(mut field) = Field::new(3, "") else { return Ok(()) };
-        field.launch(&NODES, &[]);
+        field.launch(&NODES);
         let (first, term) = agreed(&field, &NODES);
         let reader = Reader::new(&field);
         reader.go_on();
@@ -112,7 +112,7 @@ fn when_the_master_dies_the_next_takes_over_and_no_node_s_time_goes_back_or_leav
         halt(launch);
         signal(router, Signal::SIGKILL);
         let killed = Instant::now();
-        wait(format!("{router} is gone"), || (!runs(router)).then_some(()));
+        until(format!("{router} is gone"), || !runs(router));
         let others: Vec<&str> = NODES.into_iter().filter(|node| *node != first).collect();
         let (second, next_term) = agreed(&field, &others);
         assert!(stalls.ran(killed) < TAKEN_OVER_WITHIN, "after {:?}", killed.elapsed());

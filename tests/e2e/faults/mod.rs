@@ -16,24 +16,21 @@ mod sealed;
 mod strangers;
 mod twice;
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, lab, probe, wait};
-use crate::process::Running;
-use rohrpost::common::GET_DATA;
+use crate::harness::{OUTPUT, PATIENCE, Place, lab, probe, until, wait};
+use crate::network::{Network, at, nodes};
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{LinkState, Links, PeerLink, RouterInterface};
 use rohrpost::schema::Data;
-use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Fault, Name};
 use rohrpost_config::Installation;
-use rohrpost_routers::lab::Lab;
 use rohrpost_testbed::stalls::Stalls;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Nodes, their addresses, and the instances of their tools.
-const NODES: [(&str, &str, &str); 3] =
-    [("base", "10.78.0.1", "[0, 15]"), ("arm", "10.78.0.2", "[16, 31]"), ("desk", "10.78.0.3", "[32, 47]")];
+/// Nodes and their addresses.
+const NODES: [(&str, &str); 3] = [("base", "10.78.0.1"), ("arm", "10.78.0.2"), ("desk", "10.78.0.3")];
 /// Older packages are not run; seed 002 has this under "at most once".
 const TRANSIT_MAX: Duration = Duration::from_secs(2);
 /// "At once", in time in which the computer runs; a call that is not answered takes [`PATIENCE`].
@@ -45,13 +42,18 @@ static TURN: Mutex<()> = Mutex::new(());
 
 /// Nodes of a system, each in its namespace.
 struct Field {
-    // Dropped in this order: processes, what they left, their network, the turn.
-    nodes: Vec<(&'static str, Running, Robot)>,
-    place: Place,
-    lab: Lab,
-    config: PathBuf,
+    // Dropped in this order.
+    network: Network,
     stalls: Stalls,
     _turn: MutexGuard<'static, ()>,
+}
+
+impl Deref for Field {
+    type Target = Network;
+
+    fn deref(&self) -> &Network {
+        &self.network
+    }
 }
 
 impl Field {
@@ -59,24 +61,22 @@ impl Field {
     /// are not permitted.
     fn new(nodes: usize, network: &str) -> Option<Self> {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        let lab = lab(NODES[..nodes].iter().map(|(name, address, _)| (*name, *address)), "faults of networks")?;
+        let lab = lab(NODES[..nodes].iter().copied(), "faults of networks")?;
         let place = Place::new();
-        let config = configure(&place, "test", nodes, network, &[&format!("{OUTPUT}node = \"base\"\n"), LOG]);
-        Some(Self { nodes: Vec::new(), place, lab, config, stalls: Stalls::watch(), _turn: turn })
+        let config = configure(&place, "test", nodes, network, &[&at("base", OUTPUT), LOG]);
+        Some(Self { network: Network::new(place, config, Some(lab)), stalls: Stalls::watch(), _turn: turn })
     }
 
     /// `base` and `arm`, at work.
     fn launched() -> Option<Self> {
         let mut field = Self::new(2, "")?;
-        field.launch(&["base", "arm"], &[]);
+        field.launch(&["base", "arm"]);
         Some(field)
     }
 
-    /// Launches nodes, all at once, with this in their environment, and waits until all modules are on and the routers
-    /// hear each other.
-    fn launch(&mut self, nodes: &[&'static str], environment: &[(&str, &str)]) {
-        let config = self.config.clone();
-        self.launch_from(&config, nodes, environment);
+    /// Launches nodes, all at once, and waits until all modules are on and the routers hear each other.
+    fn launch(&mut self, nodes: &[&'static str]) {
+        self.launch_deaf(nodes);
         for node in nodes {
             for peer in self.nodes.iter().map(|(name, ..)| *name).filter(|name| name != node) {
                 self.wait_for_state(node, peer, LinkState::Alive);
@@ -84,45 +84,14 @@ impl Field {
         }
     }
 
-    /// The same with another configuration; no router needs to be heard.
-    fn launch_from(&mut self, config: &Path, nodes: &[&'static str], environment: &[(&str, &str)]) {
-        let begin = |node: &&'static str| {
-            let mut command = self.place.command(&["launch", config.to_str().unwrap(), "--node", node]);
-            command.envs(environment.iter().copied());
-            let _inside = self.lab.enter(node).unwrap();
-            (*node, Running::start(command))
-        };
-        let begun: Vec<_> = nodes.iter().map(begin).collect();
-        for (node, mut launch) in begun {
-            let robot = self.place.robot(config, node, &mut launch);
-            robot.wait_on(&mut launch);
-            self.nodes.push((node, launch, robot));
-        }
-    }
-
-    /// Ends a node in order.
-    fn halt_node(&mut self, node: &str) {
-        let at = self.nodes.iter().position(|(name, ..)| *name == node).unwrap();
-        let (_, mut launch, robot) = self.nodes.remove(at);
-        drop(robot);
-        launch.stop();
+    /// The same, where no router needs to be heard.
+    fn launch_deaf(&mut self, nodes: &[&'static str]) {
+        self.network.launch_from(&self.config.clone(), nodes);
     }
 
     /// Ends all; nothing is left.
-    fn stop(mut self) {
-        while let Some((_, mut launch, robot)) = self.nodes.pop() {
-            drop(robot);
-            launch.stop();
-        }
-        self.place.assert_empty();
-    }
-
-    fn robot(&self, node: &str) -> &Robot {
-        &self.nodes.iter().find(|(name, ..)| *name == node).unwrap().2
-    }
-
-    fn launcher(&self, node: &str) -> &Running {
-        &self.nodes.iter().find(|(name, ..)| *name == node).unwrap().1
+    fn stop(self) {
+        self.network.stop();
     }
 
     /// A router's process.
@@ -138,11 +107,9 @@ impl Field {
     /// A router's own report, at most half a second old.
     fn said<T: Data>(&self, node: &str, port: DataPort<T>) -> T {
         let robot = self.robot(node);
-        let router = robot.name(&router_of(node));
         wait(format!("{} of {node}", port.name), || {
             let mut tool = robot.tool(Duration::from_secs(2));
-            let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
-            let said = tool.call::<(u64, T)>(router, GET_DATA, (port.hash)(), ask, |bytes| from_bytes(bytes));
+            let said = robot.newest(&mut tool, &router_of(node), port);
             tool.close();
             // A router that was just started has no report yet.
             said.ok().map(|(_, said)| said)
@@ -159,13 +126,12 @@ impl Field {
     }
 
     fn wait_for_state(&self, node: &str, peer: &str, state: LinkState) {
-        wait(format!("{peer} is {state:?} to {node}"), || (self.peer(node, peer).state == state).then_some(()));
+        until(format!("{peer} is {state:?} to {node}"), || self.peer(node, peer).state == state);
     }
 
     /// Datagrams that a node's kernel dropped because a buffer was full.
     fn dropped(&self, node: &str) -> u64 {
-        let _inside = self.lab.enter(node).unwrap();
-        let text = std::fs::read_to_string("/proc/thread-self/net/snmp").unwrap();
+        let text = self.inside(node, || std::fs::read_to_string("/proc/thread-self/net/snmp").unwrap());
         let mut rows = text.lines().filter_map(|line| line.strip_prefix("Udp: "));
         let (names, values) = (rows.next().unwrap(), rows.next().unwrap());
         let at = names.split(' ').position(|name| name == "RcvbufErrors").unwrap();
@@ -179,7 +145,7 @@ impl Field {
 
     /// Waits until a module has reported this so many times in all.
     fn wait_told(&self, module: &str, words: &[&str], times: usize) {
-        wait(format!("{module} says {words:?}"), || (self.lines(module, words).len() >= times).then_some(()));
+        until(format!("{module} says {words:?}"), || self.lines(module, words).len() >= times);
     }
 
     /// The result of counting on another node, if the answer comes within the timeout.
@@ -217,17 +183,14 @@ impl Field {
 const NEVER: u32 = u32::MAX;
 
 /// Writes a configuration of the first nodes, a probe on each.
-fn configure(place: &Place, name: &str, nodes: usize, network: &str, further: &[&str]) -> PathBuf {
-    let node = |(name, address, tools): &(&str, &str, &str)| {
-        format!("[nodes.{name}]\naddress = \"{address}\"\ntools = {tools}\n")
-    };
-    let all: String = NODES[..nodes].iter().map(node).collect();
+fn configure(place: &Place, name: &str, count: usize, network: &str, further: &[&str]) -> PathBuf {
+    let all = nodes(NODES[..count].iter().copied());
     let security = if network.contains("security") { "" } else { "security = \"none\"\n" };
     let sections = format!("{all}[network]\n{security}{network}\n[time]\nsource = \"master\"\ninterval = \"500 ms\"\n");
-    let on = |(index, (node, ..)): (usize, &(&str, &str, &str))| {
+    let on = |(index, (node, ..)): (usize, &(&str, &str))| {
         probe(&format!("probe.{index}"), "rate-hz = 50.0", &format!("node = \"{node}\""))
     };
-    let probes: String = NODES[..nodes].iter().enumerate().map(on).collect();
+    let probes: String = NODES[..count].iter().enumerate().map(on).collect();
     place.config_of(name, &sections, &[&[probes.as_str()], further].concat())
 }
 

@@ -2,8 +2,8 @@
 
 use super::strangers::of_earlier_version;
 use super::{Field, LOG, configure, lines};
-use crate::harness::{OUTPUT, signal, wait};
-use crate::process::Said;
+use crate::harness::{OUTPUT, signal, until, wait};
+use crate::network::at;
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::LinkState;
 use rohrpost::{CallError, Fault};
@@ -37,14 +37,10 @@ impl Field {
         other
     }
 
-    fn say_at(&self, node: &str, arguments: &[&str]) -> Said {
-        self.place.say_at(&self.config, node, arguments)
-    }
-
     /// A configuration of two nodes with these security settings, in which the collector of lines is on the other node.
-    fn collects_on_arm(&self, security: &str) -> PathBuf {
+    pub(super) fn collects_on_arm(&self, security: &str) -> PathBuf {
         let log = LOG.replace("robot.log", "arm.log");
-        let other = configure(&self.place, "other", 2, security, &[&format!("{OUTPUT}node = \"arm\"\n"), &log]);
+        let other = configure(&self.place, "other", 2, security, &[&at("arm", OUTPUT), &log]);
         // One installation for shared memory.
         let text = std::fs::read_to_string(&other).unwrap();
         std::fs::write(&other, text.replace("installation = \"other\"", "installation = \"test\"")).unwrap();
@@ -55,15 +51,15 @@ impl Field {
     fn wait_apart(&self, base: &[&str], arm: &[&str]) {
         self.wait_told("router.0", base, 1);
         let log = self.place.path("arm.log");
-        wait(format!("arm says {arm:?}"), || (!lines(&log, "router.1", arm).is_empty()).then_some(()));
+        until(format!("arm says {arm:?}"), || !lines(&log, "router.1", arm).is_empty());
     }
 }
 
 #[test]
 fn sealed_nodes_exchange_calls_and_data_and_nothing_of_it_can_be_read() {
     let Some(mut field) = Field::sealed(3) else { return };
-    let mut capture = field.lab.capture().unwrap();
-    field.launch(&["base", "arm", "desk"], &[]);
+    let mut capture = field.lab().capture().unwrap();
+    field.launch(&["base", "arm", "desk"]);
     let (mut datagrams, mut unsealed, mut readable) = (0, 0, 0);
     let mut look = || {
         capture.drain(|crossing| {
@@ -76,17 +72,16 @@ fn sealed_nodes_exchange_calls_and_data_and_nothing_of_it_can_be_read() {
     for (number, (node, to)) in (1..).zip([("base", "probe.1"), ("arm", "probe.2"), ("desk", "probe.0")]) {
         field.wait_counted(node, to, number);
         let word = SECRET.repeat(20);
-        let told = field.say_at(node, &["call", to, "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
-        assert!(told.contains(&word), "{told}");
+        field.says(node, &["call", to, "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok_with([&word]);
         look();
     }
-    let data = field.say_at("base", &["echo", "probe.1", "beat", "--count", "3"]).ok();
+    let data = field.says("base", &["echo", "probe.1", "beat", "--count", "3"]).ok();
     assert_eq!(data.lines().count(), 3, "{data}");
     // Time too: all have that of one master.
     for (node, master) in [("arm", "base"), ("desk", "base")] {
-        wait(format!("{node} has the time of {master}"), || {
+        until(format!("{node} has the time of {master}"), || {
             let clock = field.said(node, rohrpost::interfaces::RouterInterface::CLOCK);
-            (clock.master == master && clock.error_ns.is_some()).then_some(())
+            clock.master == master && clock.error_ns.is_some()
         });
     }
     look();
@@ -102,8 +97,7 @@ fn a_node_with_another_key_or_none_takes_no_part_and_both_say_why() {
     field.keys("new", "second");
     field.keys("rotate", "second");
     field.keys("finish", "second");
-    let config = field.config.clone();
-    field.launch_from(&config, &["base"], &[]);
+    field.launch_deaf(&["base"]);
     let (from_arm, from_base) = ("takes nothing from node arm (10.78.0.2)", "takes nothing from node base (10.78.0.1)");
     for (name, security, cause, base, arm) in [
         (
@@ -123,7 +117,7 @@ fn a_node_with_another_key_or_none_takes_no_part_and_both_say_why() {
         ("none", "security = \"none\"", "unsealed", "it is not sealed", "one of both seals"),
     ] {
         let other = field.collects_on_arm(security);
-        field.launch_from(&other, &["arm"], &[]);
+        field.network.launch_from(&other, &["arm"]);
         field.wait_apart(&[from_arm, base], &[from_base, arm]);
         let peer = field.peer("base", "arm");
         assert_eq!((peer.received.datagrams, peer.received.packages), (0, 0), "{name}: nothing of it was taken");
@@ -144,21 +138,21 @@ fn a_node_with_another_key_or_none_takes_no_part_and_both_say_why() {
         wait(format!("{name}: callers are told"), || Some(field.fault("base", "probe.1")).filter(told));
         field.wait_for_state("base", "arm", LinkState::Refused);
         for words in [&["ping", "probe.1", "-c", "1"][..], &["net"], &["list"]] {
-            wait(format!("{name}: {words:?} tells"), || {
+            until(format!("{name}: {words:?} tells"), || {
                 // As seen from the base, which is the first.
                 let said = field.place.say(&[words, &["--config", field.config.to_str().unwrap()]].concat());
-                (said.out + &said.err).contains(hint).then_some(())
+                (said.out + &said.err).contains(hint)
             });
         }
-        field.halt_node("arm");
+        field.network.halt("arm");
         std::fs::remove_file(field.place.path("arm.log")).unwrap();
     }
     // Without the file a node is not even launched.
     let other = field.with("arm", "security = \"keys\"\nkeys = \"nowhere\"");
-    let said = field.place.say(&["launch", other.to_str().unwrap(), "--node", "arm"]).fails();
-    assert!(said.contains("nowhere/udp.keys") && said.contains("copy this folder from the first computer"), "{said}");
+    let said = field.place.say(&["launch", other.to_str().unwrap(), "--node", "arm"]);
+    said.fails_with(["nowhere/udp.keys", "copy this folder from the first computer"]);
     // With the right key it takes part.
-    field.launch(&["arm"], &[]);
+    field.launch(&["arm"]);
     field.wait_counted("base", "probe.1", 1);
     field.stop();
 }
@@ -167,9 +161,8 @@ fn a_node_with_another_key_or_none_takes_no_part_and_both_say_why() {
 fn sealed_nodes_with_different_configurations_both_say_why() {
     let Some(mut field) = Field::sealed(2) else { return };
     let other = field.collects_on_arm(KEYS);
-    let config = field.config.clone();
-    field.launch_from(&config, &["base"], &[]);
-    field.launch_from(&other, &["arm"], &[]);
+    field.launch_deaf(&["base"]);
+    field.network.launch_from(&other, &["arm"]);
     let words = "its configuration has the digest";
     field.wait_apart(&["takes nothing from node arm", words], &["takes nothing from node base", words]);
     for (node, peer) in [("base", "arm"), ("arm", "base")] {
@@ -181,12 +174,9 @@ fn sealed_nodes_with_different_configurations_both_say_why() {
 #[test]
 fn a_sealed_node_says_that_another_speaks_another_wire_format() {
     let Some(mut field) = Field::sealed(2) else { return };
-    field.launch(&["base"], &[]);
+    field.launch(&["base"]);
     // The test is the router of the arm.
-    let arm = {
-        let _inside = field.lab.enter("arm").unwrap();
-        UdpSocket::bind(("10.78.0.2", 21117)).unwrap()
-    };
+    let arm = field.inside("arm", || UdpSocket::bind(("10.78.0.2", 21117)).unwrap());
     let (kind, digest) = (FrameKind::Packages, field.digest());
     let head = FrameHead { kind, system: 1, from: 1, to: 0, digest, incarnation: 9, sequence: 0 };
     let counted = || field.links("base").rejections.into_iter().find(|rejected| rejected.cause == "version");
@@ -220,7 +210,7 @@ fn keys_are_changed_node_by_node_while_calls_go_on() {
     for node in nodes {
         copy(&field, node);
         let config = field.with(node, &format!("{KEYS}\nkeys = \"{node}\""));
-        field.launch_from(&config, &[node], &[]);
+        field.network.launch_from(&config, &[node]);
     }
     let mut number = 0;
     let mut all_reach_all = |field: &Field| {
@@ -249,7 +239,7 @@ fn a_command_of_a_class_that_is_not_listed_is_answered_with_the_rule() {
     let Some(mut field) = Field::sealed(2) else { return };
     let text = std::fs::read_to_string(&field.config).unwrap();
     std::fs::write(&field.config, format!("{text}\n[access]\nprobe = [\"probe\"]\n")).unwrap();
-    field.launch(&["base", "arm"], &[]);
+    field.launch(&["base", "arm"]);
     let line = text.lines().count() + 3;
     // A command from another node is refused by the router, one from the same node by the module itself.
     for from in ["base", "arm"] {

@@ -2,7 +2,8 @@
 
 use super::flow::{PLAIN, Sink, Source, carried, lost};
 use super::{Field, LOG, configure, lines};
-use crate::harness::{OUTPUT, PATIENCE, wait};
+use crate::harness::{OUTPUT, PATIENCE, until, wait};
+use crate::network::at;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_config::Installation;
@@ -13,15 +14,9 @@ use std::time::{Duration, Instant};
 #[test]
 fn nodes_with_different_configurations_refuse_each_other_and_both_say_why() {
     let Some(mut field) = Field::new(2, "") else { return };
-    // The same two nodes; but the collector of lines is on the other one.
-    let log = LOG.replace("robot.log", "arm.log");
-    let other = configure(&field.place, "other", 2, "", &[&format!("{OUTPUT}node = \"arm\"\n"), &log]);
-    // One installation for shared memory.
-    let text = std::fs::read_to_string(&other).unwrap();
-    std::fs::write(&other, text.replace("installation = \"other\"", "installation = \"test\"")).unwrap();
-    let config = field.config.clone();
-    field.launch_from(&config, &["base"], &[]);
-    field.launch_from(&other, &["arm"], &[]);
+    let (config, other) = (field.config.clone(), field.collects_on_arm(""));
+    field.launch_deaf(&["base"]);
+    field.network.launch_from(&other, &["arm"]);
 
     let digests = [&config, &other].map(|file| format!("{:016x}", Installation::load(file).unwrap().digest().lan()));
     assert_ne!(digests[0], digests[1]);
@@ -33,7 +28,7 @@ fn nodes_with_different_configurations_refuse_each_other_and_both_say_why() {
         for start in [format!("takes nothing from {peer} (10.78"), format!("{peer} (10.78.0.")] {
             let log = field.place.path(log);
             let words = [start.as_str(), its.as_str(), "launch all nodes from the same file"];
-            wait(format!("{router} says {words:?}"), || (!lines(&log, router, &words).is_empty()).then_some(()));
+            until(format!("{router} says {words:?}"), || !lines(&log, router, &words).is_empty());
         }
     }
     // Neither commands nor data pass, in neither direction.
@@ -59,8 +54,8 @@ fn nodes_with_different_configurations_refuse_each_other_and_both_say_why() {
     assert!(sink.came.is_empty() && field.place.counted().is_empty(), "{:?}", sink.came);
 
     drop((source, sink));
-    field.halt_node("arm");
-    field.launch(&["arm"], &[]);
+    field.network.halt("arm");
+    field.launch(&["arm"]);
     field.wait_counted("base", "probe.1", 1);
     field.wait_counted("arm", "probe.0", 2);
     field.stop();
@@ -85,12 +80,9 @@ pub(super) fn of_earlier_version(head: &FrameHead) -> Vec<u8> {
 #[test]
 fn a_node_with_another_version_is_refused_by_both_versions_and_told_so_once_a_second() {
     let Some(mut field) = Field::new(3, "") else { return };
-    field.launch_from(&field.config.clone(), &["base"], &[]);
+    field.launch_deaf(&["base"]);
     // The test is the router of the desk.
-    let desk = {
-        let _inside = field.lab.enter("desk").unwrap();
-        UdpSocket::bind(("10.78.0.3", 21117)).unwrap()
-    };
+    let desk = field.inside("desk", || UdpSocket::bind(("10.78.0.3", 21117)).unwrap());
     let head = FrameHead {
         kind: FrameKind::Packages,
         system: 1,

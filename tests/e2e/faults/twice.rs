@@ -2,7 +2,7 @@
 
 use super::flow::{ALONE_BYTES, PLAIN, Sink, Source};
 use super::{Field, mailbox_on};
-use crate::harness::wait;
+use crate::harness::until;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_mailbox::{Head, Type};
@@ -21,8 +21,7 @@ struct Second {
 
 impl Second {
     fn new(field: &Field) -> Self {
-        let _inside = field.lab.enter("arm").unwrap();
-        let socket = UdpSocket::bind(("10.78.0.2", 0)).unwrap();
+        let socket = field.inside("arm", || UdpSocket::bind(("10.78.0.2", 0)).unwrap());
         let digest = field.digest();
         let head =
             FrameHead { kind: FrameKind::Packages, system: 1, from: 1, to: 0, digest, incarnation: 4711, sequence: 0 };
@@ -55,17 +54,17 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
     let mut first = Source::new(field.robot("arm"), "arm", "base", PLAIN);
     let mut second = Second::new(&field);
     let words = ["two routers send as node arm", "address is used twice"];
-    wait("base tells of two", || {
+    until("base tells of two", || {
         first.send();
         second.send();
         sink.take(Duration::from_millis(1));
-        (!field.lines("router.0", &words).is_empty()).then_some(())
+        !field.lines("router.0", &words).is_empty()
     });
     field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
     // Delivered packages: the first router's until the second is heard, the second's alone from there on.
-    wait("all of the second came", || {
+    until("all of the second came", || {
         sink.take(Duration::from_millis(1));
-        (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
+        sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))
     });
     let numbers = sink.numbers(PLAIN);
     // The first datagram of another incarnation is lost: it only counts once a second one confirms it.
@@ -76,27 +75,27 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
         "all of the second from then on, and nothing else"
     );
     // Only its own router knows how many there were: a busy computer cannot send a whole burst.
-    wait("those of the first are counted", || (field.peer("base", "arm").counters.refused > 0).then_some(()));
+    until("those of the first are counted", || field.peer("base", "arm").counters.refused > 0);
     // The first notices that its peer accepts another router.
-    wait("arm is not heard", || {
+    until("arm is not heard", || {
         second.send();
-        (field.peer("arm", "base").state == LinkState::Unheard).then_some(())
+        field.peer("arm", "base").state == LinkState::Unheard
     });
     assert_eq!(field.fault("arm", "probe.0"), Fault::NodeDeaf { node: "base".into() });
 
     // The second ends: after a second of its silence the first is heard again.
     sink.came.clear();
-    wait("the first is heard again", || {
+    until("the first is heard again", || {
         first.send();
         sink.take(Duration::from_millis(1));
-        (sink.numbers(PLAIN).iter().filter(|number| **number < SECOND).count() > 10).then_some(())
+        sink.numbers(PLAIN).iter().filter(|number| **number < SECOND).count() > 10
     });
     let numbers = sink.numbers(PLAIN);
     let first_again = numbers.iter().position(|number| *number < SECOND).unwrap();
     assert!(numbers[first_again..].is_sorted_by(|one, next| one < next), "in order, none twice, none of the second");
     field.wait_counted("base", "probe.1", 2);
     field.wait_counted("arm", "probe.0", 3);
-    wait("to the second, and back", || (field.peer("base", "arm").counters.restarts == 2).then_some(()));
+    until("to the second, and back", || field.peer("base", "arm").counters.restarts == 2);
     assert_eq!(field.lines("router.0", &words).len(), 1, "told once");
     drop((first, sink));
     field.stop();

@@ -1,14 +1,39 @@
-//! What tests did not test, and what they tried again, so that a run does not hide it.
+//! What tests of all crates share: how they wait, and the report of what they did not test and what they tried again, so
+//! that a run does not hide it.
 //!
-//! Each goes to stderr past the test harness, which keeps what passing tests print to itself, and as a line to the file
+//! Each report goes to stderr past the test harness, which keeps what passing tests print to itself, and as a line to the file
 //! that [`FILE`] names, if it does: `skipped` or `repeated`, the place in the source, the reason; tabs in between.
 //! `cargo xtask test` prints all of them last, and fails if there are more than the repository allows.
 
 #![forbid(unsafe_code)]
 
+use std::fmt::Debug;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::panic::Location;
+use std::time::{Duration, Instant};
+
+/// Limit of all waits, long enough for a busy computer.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Waits until there is a value, and fails with the name of what was awaited.
+#[track_caller]
+pub fn wait<T>(what: impl Debug, mut look: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(start.elapsed() < PATIENCE, "waited {PATIENCE:?} in vain: {what:?}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Waits until this is so, and fails with the name of what was awaited.
+#[track_caller]
+pub fn until(what: impl Debug, mut is_so: impl FnMut() -> bool) {
+    wait(what, || is_so().then_some(()));
+}
 
 /// Environment variable with the file's path.
 pub const FILE: &str = "ROHRPOST_TEST_REPORT";
