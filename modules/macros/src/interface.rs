@@ -4,14 +4,14 @@ mod proxy;
 
 use crate::said::Said;
 use crate::text::text_of;
-use proc_macro2::TokenStream;
-use quote::{format_ident, quote};
+use proc_macro2::{Span, TokenStream};
+use quote::{ToTokens, format_ident, quote};
 use syn::ext::IdentExt;
-use syn::parse::{Parse, ParseStream};
+use syn::parse::{Parse, ParseStream, Parser};
 use syn::spanned::Spanned;
 use syn::{
-    Error, FnArg, Ident, ItemTrait, LitInt, LitStr, Pat, Result, ReturnType, Signature, Token, TraitItem, TraitItemFn,
-    Type,
+    Error, FnArg, Ident, ItemTrait, LitInt, LitStr, Pat, Path, Result, ReturnType, Signature, Token, TraitItem,
+    TraitItemFn, Type,
 };
 
 const ARGUMENTS_MAX: usize = 8;
@@ -22,28 +22,22 @@ struct InterfaceOptions {
     krate: TokenStream,
 }
 
-impl Parse for InterfaceOptions {
-    fn parse(input: ParseStream<'_>) -> Result<Self> {
+impl InterfaceOptions {
+    fn of(attributes: TokenStream) -> Result<Self> {
         let (mut class, mut krate) = (None, quote!(::rohrpost::macro_support));
-        while !input.is_empty() {
-            if input.peek(Token![crate]) {
-                input.parse::<Token![crate]>()?;
-                input.parse::<Token![=]>()?;
-                let path: syn::Path = input.parse()?;
-                krate = quote!(#path);
+        let read = syn::meta::parser(|meta| {
+            if meta.path.is_ident("crate") {
+                krate = meta.value()?.parse::<Path>()?.into_token_stream();
+            } else if meta.path.is_ident("class") {
+                class = Some(meta.value()?.parse()?);
             } else {
-                let key: Ident = input.parse()?;
-                if key != "class" {
-                    return Err(Error::new(key.span(), "unknown key; write `class = \"motor\"`"));
-                }
-                input.parse::<Token![=]>()?;
-                class = Some(input.parse()?);
+                return Err(meta.error("unknown key; write `class = \"motor\"`"));
             }
-            if !input.is_empty() {
-                input.parse::<Token![,]>()?;
-            }
-        }
-        let class = class.ok_or_else(|| input.error("which class? write `#[interface(class = \"motor\")]`"))?;
+            Ok(())
+        });
+        read.parse2(attributes)?;
+        let text = "which class? write `#[interface(class = \"motor\")]`";
+        let class = class.ok_or_else(|| Error::new(Span::call_site(), text))?;
         Ok(Self { class, krate })
     }
 }
@@ -107,7 +101,7 @@ impl DataKind {
 }
 
 pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
-    let InterfaceOptions { class, krate } = syn::parse2(attributes)?;
+    let InterfaceOptions { class, krate } = InterfaceOptions::of(attributes)?;
     let mut item: ItemTrait = syn::parse2(item)?;
     let (mut commands, mut data) = (Vec::new(), Vec::new());
     let mut kept = Vec::new();

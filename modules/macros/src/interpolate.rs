@@ -1,10 +1,9 @@
 //! From a struct to its values in between.
 
 use proc_macro2::TokenStream;
-use quote::{quote, quote_spanned};
-use syn::parse::ParseStream;
+use quote::{ToTokens, quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{Attribute, Error, Field, GenericParam, Ident, Index, Item, ItemStruct, Path, Result, Token, parse_quote};
+use syn::{Attribute, Error, Field, GenericParam, Ident, Index, Item, ItemStruct, Path, Result, parse_quote};
 
 /// Where the value of a field comes from.
 #[derive(Clone, Copy)]
@@ -53,25 +52,15 @@ fn value(fusion: &TokenStream, index: usize, field: &Field) -> Result<TokenStrea
     };
     // A type without such values is marked in the field, not in the derive.
     let (ty, span) = (&field.ty, field.ty.span());
-    let value = match way(&field.attrs)? {
-        Way::Between => {
-            let interpolate = quote_spanned!(span=> <#ty as #fusion::Interpolate>::interpolate);
-            quote!(#interpolate(&from.#member, &to.#member, share))
-        }
-        Way::Heading => {
-            let turn = quote_spanned!(span=> <#ty as #fusion::Heading>::turn);
-            quote!(#turn(&from.#member, &to.#member, share))
-        }
-        Way::Earlier => {
-            let clone = quote_spanned!(span=> <#ty as ::core::clone::Clone>::clone);
-            quote!(#clone(&from.#member))
-        }
-        Way::Nearer => {
-            let clone = quote_spanned!(span=> <#ty as ::core::clone::Clone>::clone);
-            quote!(#clone(share.nearer(&from.#member, &to.#member)))
-        }
+    let both = quote!(&from.#member, &to.#member, share);
+    let clone = quote_spanned!(span=> <#ty as ::core::clone::Clone>::clone);
+    let (function, arguments) = match way(&field.attrs)? {
+        Way::Between => (quote_spanned!(span=> <#ty as #fusion::Interpolate>::interpolate), both),
+        Way::Heading => (quote_spanned!(span=> <#ty as #fusion::Heading>::turn), both),
+        Way::Earlier => (clone, quote!(&from.#member)),
+        Way::Nearer => (clone, quote!(share.nearer(&from.#member, &to.#member))),
     };
-    Ok(quote!(#member: #value))
+    Ok(quote!(#member: #function(#arguments)))
 }
 
 /// `heading`, `earlier` or `nearer` before a field.
@@ -98,13 +87,11 @@ const KEYS: &str = "a field has `heading`, `earlier` or `nearer`; without, its t
 fn fusion_crate(attributes: &[Attribute]) -> Result<TokenStream> {
     let mut fusion = quote!(::rohrpost::fusion);
     for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident("interpolate")) {
-        attribute.parse_args_with(|input: ParseStream<'_>| {
-            if input.parse::<Option<Token![crate]>>()?.is_none() {
-                return Err(input.error("a struct has `crate = path`; keys of fields stand before fields"));
+        attribute.parse_nested_meta(|meta| {
+            if !meta.path.is_ident("crate") {
+                return Err(meta.error("a struct has `crate = path`; keys of fields stand before fields"));
             }
-            input.parse::<Token![=]>()?;
-            let path: Path = input.parse()?;
-            fusion = quote!(#path);
+            fusion = meta.value()?.parse::<Path>()?.into_token_stream();
             Ok(())
         })?;
     }

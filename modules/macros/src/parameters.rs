@@ -4,7 +4,7 @@ use crate::said::{Said, is_one_of, serde_words};
 use crate::text::text_of;
 use proc_macro2::TokenStream;
 use quote::{ToTokens, format_ident, quote};
-use syn::parse::{Parse, ParseStream};
+use syn::parse::Parser;
 use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{
@@ -15,25 +15,17 @@ use syn::{
 const WRITTEN: [&str; 3] = ["crate", "deny_unknown_fields", "rename_all"];
 
 /// `crate = crate::macro_support`, for our own crates alone.
-struct ParameterOptions {
-    krate: TokenStream,
-}
-
-impl Parse for ParameterOptions {
-    fn parse(input: ParseStream<'_>) -> Result<Self> {
-        if input.is_empty() {
-            return Ok(Self { krate: quote!(::rohrpost::macro_support) });
+fn support_crate(attributes: TokenStream) -> Result<TokenStream> {
+    let mut krate = quote!(::rohrpost::macro_support);
+    let read = syn::meta::parser(|meta| {
+        if !meta.path.is_ident("crate") {
+            return Err(meta.error("nothing stands here; `unit`, `min` and `max` belong to #[parameter(…)] of a field"));
         }
-        if !input.peek(Token![crate]) {
-            return Err(
-                input.error("nothing stands here; `unit`, `min` and `max` belong to #[parameter(…)] of a field")
-            );
-        }
-        input.parse::<Token![crate]>()?;
-        input.parse::<Token![=]>()?;
-        let path: Path = input.parse()?;
-        Ok(Self { krate: quote!(#path) })
-    }
+        krate = meta.value()?.parse::<Path>()?.into_token_stream();
+        Ok(())
+    });
+    read.parse2(attributes)?;
+    Ok(krate)
 }
 
 struct Parameter {
@@ -56,9 +48,9 @@ impl Parameter {
             return Ok(None);
         };
         let attribute = field.attrs.remove(at);
-        let said: Said = match &attribute.meta {
+        let said = match &attribute.meta {
             Meta::Path(_) => Said::default(),
-            _ => attribute.parse_args()?,
+            _ => Said::of(&attribute)?,
         };
         let name = field.ident.clone().ok_or_else(|| Error::new(field.span(), "a parameter's field has a name"))?;
         let text = text_of(&field.attrs);
@@ -138,7 +130,7 @@ fn nothing_twice(attributes: &[Attribute], ours: &[&str]) -> Result<()> {
 }
 
 pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
-    let ParameterOptions { krate } = syn::parse2(attributes)?;
+    let krate = support_crate(attributes)?;
     let mut item: ItemStruct = syn::parse2(item)
         .map_err(|error| Error::new(error.span(), "parameters are fields of a struct: the module's settings"))?;
     if !item.generics.params.is_empty() {
@@ -212,7 +204,7 @@ fn parameter_set(owner: &Ident, krate: &TokenStream, parameters: &[Parameter]) -
 }
 
 pub(crate) fn expand_choice(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
-    let ParameterOptions { krate } = syn::parse2(attributes)?;
+    let krate = support_crate(attributes)?;
     let item: ItemEnum = syn::parse2(item)
         .map_err(|error| Error::new(error.span(), "a choice is an enum with variants that carry nothing"))?;
     if !item.generics.params.is_empty() {

@@ -1,11 +1,10 @@
 //! What an author says of a value besides its type: unit, range, default. Of fields, arguments, data and parameters
 //! alike.
 
-use proc_macro2::TokenStream;
+use proc_macro2::{TokenStream, TokenTree};
 use quote::quote;
-use syn::parse::{Parse, ParseStream};
-use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
+use syn::token::Paren;
 use syn::{Attribute, Error, Expr, ExprLit, Ident, Lit, LitStr, Result, Token, Type};
 
 /// Types that have a least and a most.
@@ -21,43 +20,36 @@ pub(crate) struct Said {
     pub(crate) default: Option<Expr>,
 }
 
-impl Parse for Said {
-    fn parse(input: ParseStream<'_>) -> Result<Self> {
+impl Said {
+    /// What an attribute with arguments says.
+    pub(crate) fn of(attribute: &Attribute) -> Result<Self> {
         let mut said = Self::default();
-        while !input.is_empty() {
-            let key: Ident = input.parse()?;
-            input.parse::<Token![=]>()?;
+        attribute.parse_nested_meta(|meta| {
+            let key = meta.path.require_ident()?;
             let place = match key.to_string().as_str() {
                 "unit" => {
-                    let unit: LitStr = input.parse()?;
+                    let unit: LitStr = meta.value()?.parse()?;
                     if unit.value().trim().is_empty() {
                         return Err(Error::new(unit.span(), "an empty unit is none; leave `unit` out"));
                     }
                     said.unit.replace(unit).map(drop)
                 }
-                "min" => said.min.replace(input.parse()?).map(drop),
-                "max" => said.max.replace(input.parse()?).map(drop),
-                "default" => said.default.replace(input.parse()?).map(drop),
-                _ => return Err(Error::new(key.span(), "unknown key; there are `unit`, `min`, `max` and `default`")),
+                "min" => said.min.replace(meta.value()?.parse()?).map(drop),
+                "max" => said.max.replace(meta.value()?.parse()?).map(drop),
+                "default" => said.default.replace(meta.value()?.parse()?).map(drop),
+                _ => return Err(meta.error("unknown key; there are `unit`, `min`, `max` and `default`")),
             };
-            if place.is_some() {
-                return Err(Error::new(key.span(), format!("`{key}` is given twice")));
-            }
-            if !input.is_empty() {
-                input.parse::<Token![,]>()?;
-            }
-        }
+            place.map_or(Ok(()), |()| Err(meta.error(format!("`{key}` is given twice"))))
+        })?;
         Ok(said)
     }
-}
 
-impl Said {
     /// Takes `#[schema(…)]` off what travels.
     pub(crate) fn take(attributes: &mut Vec<Attribute>, ty: &Type) -> Result<Self> {
         let Some(at) = attributes.iter().position(|attribute| attribute.path().is_ident("schema")) else {
             return Ok(Self::default());
         };
-        let said: Self = attributes.remove(at).parse_args()?;
+        let said = Self::of(&attributes.remove(at))?;
         if let Some(default) = &said.default {
             return Err(Error::new(default.span(), "only parameters have a default"));
         }
@@ -138,27 +130,19 @@ pub(crate) struct Word {
     value: Option<Expr>,
 }
 
-impl Parse for Word {
-    fn parse(input: ParseStream<'_>) -> Result<Self> {
-        use syn::ext::IdentExt;
-        let (key, mut value) = (Ident::parse_any(input)?, None);
-        if input.parse::<Option<Token![=]>>()?.is_some() {
-            value = Some(input.parse::<Expr>()?);
-        } else if input.peek(syn::token::Paren) {
-            input.parse::<proc_macro2::TokenTree>()?;
-        }
-        Ok(Self { key, value })
-    }
-}
-
 /// What a struct's, variant's or field's serde attributes say.
 pub(crate) fn serde_words(attributes: &[Attribute]) -> Result<Vec<Word>> {
     let mut words = Vec::new();
     for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident("serde")) {
-        words.extend(
-            attribute
-                .parse_args_with(|input: ParseStream<'_>| Punctuated::<Word, Token![,]>::parse_terminated(input))?,
-        );
+        attribute.parse_nested_meta(|meta| {
+            let key = meta.path.require_ident()?.clone();
+            let value = if meta.input.peek(Token![=]) { Some(meta.value()?.parse()?) } else { None };
+            if meta.input.peek(Paren) {
+                meta.input.parse::<TokenTree>()?;
+            }
+            words.push(Word { key, value });
+            Ok(())
+        })?;
     }
     Ok(words)
 }

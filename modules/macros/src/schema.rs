@@ -3,12 +3,9 @@
 use crate::said::{Said, renamed, serde_words};
 use crate::text::text_of;
 use proc_macro2::TokenStream;
-use quote::quote;
-use syn::parse::ParseStream;
+use quote::{ToTokens, quote};
 use syn::spanned::Spanned;
-use syn::{
-    Attribute, Error, Fields, GenericParam, Generics, Ident, Item, LitStr, Path, Result, Token, Type, parse_quote,
-};
+use syn::{Attribute, Error, Fields, GenericParam, Generics, Ident, Item, LitStr, Path, Result, Type, parse_quote};
 
 /// Of serde's attributes, those that change bytes in a way that no description says.
 const UNSAID: [&str; 11] = [
@@ -35,37 +32,22 @@ impl SchemaOptions {
     fn of(attributes: &[Attribute]) -> Result<Self> {
         let mut options = Self { schema: quote!(::rohrpost_schema), name: None };
         for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident("schema")) {
-            attribute.parse_args_with(|input: ParseStream<'_>| options.read(input))?;
+            attribute.parse_nested_meta(|meta| {
+                if meta.path.is_ident("crate") {
+                    options.schema = meta.value()?.parse::<Path>()?.into_token_stream();
+                } else if meta.path.is_ident("name") {
+                    let name: LitStr = meta.value()?.parse()?;
+                    if name.value().trim().is_empty() {
+                        return Err(Error::new(name.span(), "an empty name is none"));
+                    }
+                    options.name = Some(name);
+                } else {
+                    return Err(meta.error("unknown key; a type has `name`, its fields `unit`, `min` and `max`"));
+                }
+                Ok(())
+            })?;
         }
         Ok(options)
-    }
-
-    fn read(&mut self, input: ParseStream<'_>) -> Result<()> {
-        while !input.is_empty() {
-            if input.parse::<Option<Token![crate]>>()?.is_some() {
-                input.parse::<Token![=]>()?;
-                let path: Path = input.parse()?;
-                self.schema = quote!(#path);
-            } else {
-                let key: Ident = input.parse()?;
-                if key != "name" {
-                    return Err(Error::new(
-                        key.span(),
-                        "unknown key; a type has `name`, its fields `unit`, `min` and `max`",
-                    ));
-                }
-                input.parse::<Token![=]>()?;
-                let name: LitStr = input.parse()?;
-                if name.value().trim().is_empty() {
-                    return Err(Error::new(name.span(), "an empty name is none"));
-                }
-                self.name = Some(name);
-            }
-            if !input.is_empty() {
-                input.parse::<Token![,]>()?;
-            }
-        }
-        Ok(())
     }
 }
 

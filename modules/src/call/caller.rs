@@ -1,6 +1,5 @@
 //! The link of a module as its proxies share it; what they do is noted in the module's journal, if it has one.
 
-use super::noted::NotedCallError;
 use super::{CallError, Link, append};
 use crate::journal::{Blob, ModuleJournal, NotedCommand, NotedValue, Question, Tag, nanoseconds};
 use rohrpost_mailbox::Name;
@@ -127,9 +126,7 @@ impl Caller {
             Ok(())
         };
         let begin = || link.borrow_mut().begin(to, function, interface, timeout, write);
-        let ask = || begin().map_err(NotedCallError::from);
-        let begun: Result<u32, NotedCallError> = journal.answer(Tag::Begun, Question::Plain, ask);
-        begun.map_err(CallError::from)
+        journal.answer(Tag::Begun, Question::Plain, begin)
     }
 
     /// Waits for the result of a call to this module.
@@ -154,25 +151,20 @@ impl Caller {
         let SharedLink { link, journal, .. } = &*self.0;
         let question = Question::Call { to: to.raw(), sequence };
         if let Some(given) = journal.given(Tag::Answered, question) {
-            let answer: Result<Blob<'_>, NotedCallError> = given.read();
-            let read = |bytes: Blob<'_>| decode(bytes.0).map_err(|error| CallError::BadReply(to, error.to_string()));
-            return answer.map_err(CallError::from).and_then(read);
+            let answer: Result<Blob<'_>, CallError> = given.read();
+            return decode(answer?.0).map_err(|error| CallError::BadReply(to, error.to_string()));
         }
         let mut is_noted = journal.is_none();
         let read = |bytes: &[u8]| {
-            journal.note(Tag::Answered, question, &Ok::<_, NotedCallError>(Blob(bytes)));
+            journal.note(Tag::Answered, question, &Ok::<_, CallError>(Blob(bytes)));
             is_noted = true;
             decode(bytes)
         };
         let result = link.borrow_mut().wait(sequence, read);
-        match result {
-            Err(error) if !is_noted => {
-                let error = NotedCallError::from(error);
-                journal.note(Tag::Answered, question, &Err::<Blob<'_>, _>(&error));
-                Err(error.into())
-            }
-            result => result,
+        if let Some(error) = result.as_ref().err().filter(|_| !is_noted) {
+            journal.note(Tag::Answered, question, &Err::<Blob<'_>, _>(error));
         }
+        result
     }
 
     /// Gives a call up.

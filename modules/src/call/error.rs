@@ -1,6 +1,7 @@
 //! Errors of calls: of the caller, the server and the routers.
 
 use super::envelope::TRANSIT_MAX;
+use super::noted::{NotedSendError, name};
 use super::{CallEnvelope, ReplyEnvelope};
 use crate::call::append;
 use crate::common::HASH;
@@ -194,27 +195,33 @@ fn differs(server: u32) -> String {
 ///     matches!(error, CallError::Timeout(..) | CallError::Fault(_, Fault::Interrupted))
 /// }
 /// ```
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Serialize, Deserialize, thiserror::Error)]
+#[serde(bound = "")]
 pub enum CallError<E = Infallible> {
     /// No answer in time. The command may have been run, or not; it is no longer valid.
     #[error("no answer from {0} within {1:?}; does it run, and is it not too busy?")]
-    Timeout(Name, Duration),
+    Timeout(#[serde(with = "name")] Name, Duration),
     /// The command could not be sent, and was not run.
     #[error(transparent)]
-    NotSent(#[from] SendError),
+    NotSent(
+        #[from]
+        #[serde(with = "NotedSendError")]
+        SendError,
+    ),
     /// Too many calls to this module, or in all, are under way. The command was not sent.
     #[error("too many calls to {0} are under way; wait for earlier ones, or give them up")]
-    TooMany(Name),
+    TooMany(#[serde(with = "name")] Name),
     /// The server did not run it.
     #[error("{0}: {1}")]
-    Fault(Name, Fault),
+    Fault(#[serde(with = "name")] Name, Fault),
     /// The answer is not what the interface promises.
     #[error("the answer of {0} cannot be read: {1}")]
-    BadReply(Name, String),
+    BadReply(#[serde(with = "name")] Name, String),
     /// The arguments do not fit in a package.
     #[error("the arguments cannot be written: {0}")]
     BadArguments(String),
-    /// The function was run and returned its own error.
+    /// The function was run and returned its own error. No journal has it as an error.
+    #[serde(skip)]
     #[error("{1}")]
     Module(Name, E),
 }

@@ -80,92 +80,55 @@ pub(crate) enum Tag {
     Missed,
 }
 
-const ALL: [Tag; 37] = [
-    Tag::Begin,
-    Tag::Event,
-    Tag::Time,
-    Tag::TimeRecord,
-    Tag::Opened,
-    Tag::Position,
-    Tag::HasNext,
-    Tag::Accounts,
-    Tag::Newest,
-    Tag::Next,
-    Tag::Record,
-    Tag::Around,
-    Tag::Begun,
-    Tag::Answered,
-    Tag::Wrote,
-    Tag::Named,
-    Tag::TakenIn,
-    Tag::OpenedOutside,
-    Tag::Watched,
-    Tag::Unwatched,
-    Tag::Accepted,
-    Tag::Sought,
-    Tag::Ticking,
-    Tag::Subscribed,
-    Tag::Rewound,
-    Tag::MadeMailbox,
-    Tag::File,
-    Tag::Published,
-    Tag::Written,
-    Tag::Called,
-    Tag::Replied,
-    Tag::GaveOut,
-    Tag::Failed,
-    Tag::Panicked,
-    Tag::Hole,
-    Tag::End,
-    Tag::Missed,
+/// All kinds in the order of their codes, and what a module does there.
+const ALL: [(Tag, &str); 37] = [
+    (Tag::Begin, "begins"),
+    (Tag::Event, "is called"),
+    (Tag::Time, "reads the clock"),
+    (Tag::TimeRecord, "asks what the clock goes by"),
+    (Tag::Opened, "opens a stream"),
+    (Tag::Position, "asks where it stands in a stream"),
+    (Tag::HasNext, "asks whether a stream has a next record"),
+    (Tag::Accounts, "asks how many records it has read"),
+    (Tag::Newest, "reads the newest record of a stream"),
+    (Tag::Next, "reads the next record of a stream"),
+    (Tag::Record, "reads a record of a stream"),
+    (Tag::Around, "looks for a time in a stream"),
+    (Tag::Begun, "hands a command over"),
+    (Tag::Answered, "waits for an answer"),
+    (Tag::Wrote, "ends a record of its stream"),
+    (Tag::Named, "is given what is recorded anyhow"),
+    (Tag::TakenIn, "takes something in (`take_in`)"),
+    (Tag::OpenedOutside, "opens a descriptor (`open_outside`)"),
+    (Tag::Watched, "waits for a descriptor"),
+    (Tag::Unwatched, "waits for a descriptor no longer"),
+    (Tag::Accepted, "asks what came of what it gave out"),
+    (Tag::Sought, "goes on elsewhere in a stream"),
+    (Tag::Ticking, "wants to tick"),
+    (Tag::Subscribed, "subscribes"),
+    (Tag::Rewound, "goes back in a followed stream"),
+    (Tag::MadeMailbox, "makes a mailbox"),
+    (Tag::File, "asks for a file"),
+    (Tag::Published, "publishes data"),
+    (Tag::Written, "writes a record"),
+    (Tag::Called, "sends a command"),
+    (Tag::Replied, "replies to a command"),
+    (Tag::GaveOut, "gives bytes out (`give_out`)"),
+    (Tag::Failed, "fails"),
+    (Tag::Panicked, "panics"),
+    (Tag::Hole, "does what no journal sees"),
+    (Tag::End, "ends"),
+    (Tag::Missed, "asks which records it has missed"),
 ];
 
 impl Tag {
     pub(super) fn from_code(code: u8) -> Option<Self> {
-        ALL.get(usize::from(code).checked_sub(1)?).copied()
+        Some(ALL.get(usize::from(code).checked_sub(1)?)?.0)
     }
 
     /// What a module does there.
     pub(super) fn words(self) -> &'static str {
-        match self {
-            Self::Begin => "begins",
-            Self::Event => "is called",
-            Self::Time => "reads the clock",
-            Self::TimeRecord => "asks what the clock goes by",
-            Self::Opened => "opens a stream",
-            Self::Position => "asks where it stands in a stream",
-            Self::HasNext => "asks whether a stream has a next record",
-            Self::Accounts => "asks how many records it has read",
-            Self::Newest => "reads the newest record of a stream",
-            Self::Next => "reads the next record of a stream",
-            Self::Record => "reads a record of a stream",
-            Self::Around => "looks for a time in a stream",
-            Self::Begun => "hands a command over",
-            Self::Answered => "waits for an answer",
-            Self::Wrote => "ends a record of its stream",
-            Self::Named => "is given what is recorded anyhow",
-            Self::TakenIn => "takes something in (`take_in`)",
-            Self::OpenedOutside => "opens a descriptor (`open_outside`)",
-            Self::Watched => "waits for a descriptor",
-            Self::Unwatched => "waits for a descriptor no longer",
-            Self::Accepted => "asks what came of what it gave out",
-            Self::Sought => "goes on elsewhere in a stream",
-            Self::Ticking => "wants to tick",
-            Self::Subscribed => "subscribes",
-            Self::Rewound => "goes back in a followed stream",
-            Self::MadeMailbox => "makes a mailbox",
-            Self::File => "asks for a file",
-            Self::Published => "publishes data",
-            Self::Written => "writes a record",
-            Self::Called => "sends a command",
-            Self::Replied => "replies to a command",
-            Self::GaveOut => "gives bytes out (`give_out`)",
-            Self::Failed => "fails",
-            Self::Panicked => "panics",
-            Self::Hole => "does what no journal sees",
-            Self::End => "ends",
-            Self::Missed => "asks which records it has missed",
-        }
+        ALL[self as usize - 1].1
     }
 }
 
@@ -175,7 +138,7 @@ mod tests {
 
     #[test]
     fn tags_are_their_places() {
-        for (code, tag) in (1..).zip(ALL) {
+        for (code, (tag, _)) in (1..).zip(ALL) {
             assert_eq!((tag as u8, Tag::from_code(code)), (code, Some(tag)));
         }
         assert_eq!((Tag::from_code(0), Tag::from_code(38)), (None, None));

@@ -120,7 +120,7 @@ pub enum RecordError {
 ///     }
 /// }
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, thiserror::Error)]
 pub enum StreamReadError {
     /// Its ring cannot be used; the text names it as the configuration does.
     #[error("{0}")]
@@ -140,8 +140,9 @@ pub enum StreamReadError {
         /// Hash of the interface that this program knows.
         ours: u32,
     },
-    /// A record is not what the interface says.
+    /// A record is not what the interface says. The module finds that itself, so no journal has it.
     #[error(transparent)]
+    #[serde(skip)]
     Unreadable(#[from] Unreadable),
 }
 

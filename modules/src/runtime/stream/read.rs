@@ -234,7 +234,7 @@ impl<T: Data> Stream<T> {
             return given;
         }
         let around = reader.around(rohrpost_mailbox::Stamp { epoch, ns }).map_err(|error| source.explain(&error));
-        note(journal, Tag::Around, question, &around, |around| NotedAround::from(*around));
+        note(journal, Tag::Around, question, &around, |around| NotedAround(*around));
         around
     }
 
