@@ -1,7 +1,7 @@
 //! A new file from what others have. It gets its name once it is whole.
 
 use crate::disk::{Disk, RealDisk, mode_of};
-use crate::error::{Damage, DiskError, ReadError, RewriteError};
+use crate::error::{Damage, ReadError, RewriteError};
 use crate::format::{CHUNK_BYTES_MAX, MESSAGE_OVERHEAD_BYTES, is_of_others, key};
 use crate::part_file::PartFile;
 use crate::read::attachment::Attachment;
@@ -51,9 +51,9 @@ impl Rewriter {
         self.messages
     }
 
-    pub(crate) fn metadata(&mut self, name: &str, texts: &BTreeMap<String, String>) -> Result<(), DiskError> {
+    pub(crate) fn metadata(&mut self, name: &str, texts: &BTreeMap<String, String>) -> Result<(), RewriteError> {
         self.chunk_bytes = 0;
-        self.file.metadata(name, texts)
+        Ok(self.file.metadata(name, texts)?)
     }
 
     /// Copies an attachment of this file, if it is whole.
@@ -80,7 +80,7 @@ impl Rewriter {
     }
 
     /// Describes a channel, also if no message of it comes.
-    pub(crate) fn channel(&mut self, source: usize, id: u16, channel: &Arc<Definition>) -> Result<u16, DiskError> {
+    pub(crate) fn channel(&mut self, source: usize, id: u16, channel: &Arc<Definition>) -> Result<u16, RewriteError> {
         if let Some(known) = self.channels.get(&(source, id)) {
             return Ok(*known);
         }
@@ -109,7 +109,7 @@ impl Rewriter {
         channel: &Arc<Definition>,
         header: &MessageHeader,
         data: &[u8],
-    ) -> Result<(), DiskError> {
+    ) -> Result<(), RewriteError> {
         let channel_id = self.channel(source, header.channel_id, channel)?;
         let more = data.len() + MESSAGE_OVERHEAD_BYTES;
         if self.chunk_bytes > 0 && self.chunk_bytes + more > CHUNK_BYTES_MAX {
