@@ -153,8 +153,8 @@ impl ClassTable {
             }
             let what = format!("class `{name}`");
             let Some(class) = item.section(&what) else { continue };
-            let id = class.required("id", "id = 150").and_then(|id| id.whole(1..=255, 150)).unwrap_or(0) as u8;
-            let text = class.get("text").and_then(|text| text.text("What its modules do")).unwrap_or_default();
+            let id = class.required("id", "id = 150").and_then(|id| id.whole(1..=255, 150)).unwrap_or(0);
+            let text = class.or("text", "", |text| text.text("What its modules do"));
             class.finish();
             if let Some(other) = table.name(Class(id)).filter(|_| id != 0) {
                 let free = (1..=255u8).rev().filter(|free| table.entry(Class(*free)).is_none());

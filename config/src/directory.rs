@@ -1,7 +1,7 @@
 //! Which module owns which name: collected in a first pass, so that a module may refer to one further below.
 
 use crate::classes::{ClassTable, ROUTER, TCP, TOOL, class_of};
-use crate::reader::{Section, nearest};
+use crate::reader::{Item, Section, nearest};
 use rohrpost_mailbox::Name;
 use std::collections::BTreeMap;
 
@@ -81,6 +81,13 @@ impl<'d> Directory<'d> {
             );
         }
         self.owners.insert(text.into(), name.unwrap_or_default());
+    }
+
+    /// The module or alias that an entry of a list names; if none does, that is reported.
+    pub(crate) fn module(&self, entry: &Item<'_>, text: &str) -> Option<Name> {
+        let missing =
+            |unknown: &Unknown| entry.report(format!("`{text}` is no [[module]]; {}", unknown.or("drop the entry")));
+        self.find(text).inspect_err(missing).ok()
     }
 
     /// The module or alias that a text names.

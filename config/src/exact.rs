@@ -33,18 +33,13 @@ pub fn may_have_journal(program: &Program) -> bool {
 }
 
 pub(crate) fn read(section: &Section<'_>, directory: &Directory<'_>) -> Vec<ExactModule> {
-    let items = section.get("exact").and_then(|item| item.list("[\"pilot.0\"]")).unwrap_or_default();
     let mut all: Vec<ExactModule> = Vec::new();
-    for item in &items {
+    for item in &section.or("exact", Vec::new(), |item| item.list("[\"pilot.0\"]")) {
         let Some(text) = item.text_of_list("pilot.0") else { continue };
-        match directory.find(text) {
-            Err(unknown) => item.report(format!("`{text}` is no [[module]]; {}", unknown.or("drop the entry"))),
-            Ok(name) => match all.iter().find(|first| first.name == name) {
-                Some(first) => {
-                    item.report(format!("`{text}` is in line {} of `exact` already; drop one", first.line));
-                }
-                None => all.push(ExactModule { name, line: item.line }),
-            },
+        let Some(name) = directory.module(item, text) else { continue };
+        match all.iter().find(|first| first.name == name) {
+            Some(first) => item.report(format!("`{text}` is in line {} of `exact` already; drop one", first.line)),
+            None => all.push(ExactModule { name, line: item.line }),
         }
     }
     all

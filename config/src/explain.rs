@@ -64,6 +64,13 @@ impl Page<'_> {
         self.text.push('\n');
     }
 
+    /// What the lines below are about.
+    fn title(&mut self, title: impl AsRef<str>) {
+        self.line("");
+        self.line(title);
+        self.line("");
+    }
+
     /// A label and words, with wrapped lines below each other.
     fn entry(&mut self, label: &str, words: &str) {
         let mut line = format!("  {label:<width$}", width = INDENT - 2);
@@ -192,9 +199,7 @@ impl Page<'_> {
             Some(level) => format!("  {level:>5}"),
         };
         let level_head = if network.is_some() { "  level" } else { "" };
-        self.line("");
-        self.line("Classes. The id is the priority of all that a class sends; higher goes first, everywhere.");
-        self.line("");
+        self.title("Classes. The id is the priority of all that a class sends; higher goes first, everywhere.");
         self.line(format!("  {:>3}{level_head}  {:width$}  {:13}  does", "id", "class", "runs as"));
         for entry in classes.iter() {
             let scheduling = self.installation.scheduling(entry.class);
@@ -217,9 +222,7 @@ impl Page<'_> {
         ];
         let memory = memory::of_node(&modules, others);
         let number = count_text(modules.len(), "module");
-        self.line("");
-        self.line(format!("Node `{}`: {number}, {memory}", node.name));
-        self.line("");
+        self.title(format!("Node `{}`: {number}, {memory}", node.name));
         if let Some(address) = &node.address {
             self.entry("address", &address.to_string());
         }
@@ -283,14 +286,12 @@ impl Page<'_> {
 
     fn output(&mut self) {
         let output = &self.installation.output;
-        self.line("");
+        self.title("Output");
         let mut words =
             format!("lines of level {} and above; the last {} are kept", output.level.as_str(), output.ring);
         for (module, level) in &output.levels {
             let _ = write!(words, "; {} from {}", self.name(*module), level.as_str());
         }
-        self.line("Output");
-        self.line("");
         self.entry("keeps", &words);
         let (rate, burst) = (output.rate, output.burst);
         let words = format!("{rate} lines a second from each module, {burst} at once; errors are counted apart");
@@ -314,9 +315,7 @@ impl Page<'_> {
         if show.is_empty() {
             return;
         }
-        self.line("");
-        self.line("GUI");
-        self.line("");
+        self.title("GUI");
         for show in show {
             let rate = match show.rate {
                 Some(rate) if rate > 0.0 => format!("at most {rate} a second"),
@@ -333,9 +332,7 @@ impl Page<'_> {
         if flows.is_empty() {
             return;
         }
-        self.line("");
-        self.line("Flows");
-        self.line("");
+        self.title("Flows");
         for flow in flows {
             let words = format!(
                 "{} to {}: {}{} every {}, there within {}",

@@ -28,9 +28,8 @@ impl Gui {
     pub(crate) fn read(section: Option<Section<'_>>, directory: &Directory<'_>) -> Self {
         let Some(section) = section else { return Self::default() };
         let example = "[{ from = \"laser.0\", data = \"scan\", rate = 10.0 }]";
-        let items = section.get("show").and_then(|item| item.list(example)).unwrap_or_default();
         let mut show: Vec<Show> = Vec::new();
-        for item in &items {
+        for item in &section.or("show", Vec::new(), |item| item.list(example)) {
             let Some(read) = Show::read(item, directory) else { continue };
             if let Some(first) = show.iter().find(|first| (first.from, &first.data) == (read.from, &read.data)) {
                 let from = directory.classes.format(read.from);
@@ -47,14 +46,8 @@ impl Gui {
 impl Show {
     fn read(item: &Item<'_>, directory: &Directory<'_>) -> Option<Self> {
         let section = item.section("[gui] show")?;
-        let from = section.required("from", "from = \"laser.0\"").and_then(|item| {
-            let text = item.text("laser.0")?;
-            let known = directory.find(text);
-            let missing = |unknown: &crate::directory::Unknown| {
-                item.report(format!("`{text}` is no [[module]]; {}", unknown.or("drop the entry")));
-            };
-            known.inspect_err(missing).ok()
-        });
+        let from = section.required("from", "from = \"laser.0\"");
+        let from = from.and_then(|item| directory.module(&item, item.text("laser.0")?));
         let data = section.get("data").and_then(|item| item.text("scan"));
         let rate = section.get("rate").and_then(|item| item.number(0.0..=1000.0, "10.0"));
         section.finish();

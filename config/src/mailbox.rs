@@ -105,13 +105,13 @@ impl MailboxSpec {
     fn read(&mut self, section: Section<'_>, line: &mut SpecLines, latest: bool) {
         if let Some(item) = section.get("slots") {
             line.slots = item.line;
-            self.slots = item.whole(1..=SLOTS_MAX.into(), self.slots.into()).map_or(self.slots, |slots| slots as u16);
+            self.slots = item.whole(1..=SLOTS_MAX, self.slots).unwrap_or(self.slots);
         }
         if let Some(item) = section.get("size") {
             line.size = item.line;
             self.size = item.size(1..=BODY_BYTES_MAX as u64, "1 KiB").map_or(self.size, |size| size as u32);
         }
-        let full = section.get("full").and_then(|item| {
+        self.full = section.or("full", self.full, |item| {
             if !latest && item.is(OverflowPolicy::Latest.name()) {
                 item.report(
                     "`full` is \"latest\"; write \"displace\" or \"reject\": each command has an id of its own, so \
@@ -122,10 +122,8 @@ impl MailboxSpec {
             let all = OverflowPolicy::ALL.into_iter().filter(|full| latest || *full != OverflowPolicy::Latest);
             item.choice(&all.map(|full| (full.name(), full)).collect::<Vec<_>>())
         });
-        self.full = full.unwrap_or(self.full);
         self.max_age = section.get("max-age").and_then(|item| item.duration_above_zero("2 s"));
-        let claims = section.get("claims").and_then(|item| item.whole(1..=CLAIMS_MAX.into(), 1));
-        self.claims = claims.map_or(self.claims, |claims| claims as u8);
+        self.claims = section.whole_or("claims", 1..=CLAIMS_MAX, self.claims);
         section.finish();
     }
 }

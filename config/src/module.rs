@@ -35,6 +35,9 @@ pub enum Program {
 /// Longest busy wait of a module for packages before it sleeps: after that none is likely to come soon.
 pub const SPIN_MAX: Duration = Duration::from_millis(1);
 
+/// See [`Module::ready_within`].
+const READY_WITHIN: Duration = Duration::from_secs(10);
+
 /// See [`Module::busy_after`].
 pub(crate) const BUSY_AFTER: Duration = Duration::from_secs(1);
 
@@ -157,7 +160,7 @@ impl Module {
             settings: toml::Table::new(),
             start: Start::On,
             restart,
-            ready_within: Duration::from_secs(10),
+            ready_within: READY_WITHIN,
             stop_within: crate::stopping::USUAL,
             busy_after: BUSY_AFTER,
             spin: Duration::ZERO,
@@ -215,16 +218,16 @@ impl Context<'_> {
         let aliases = section.get("aliases").map(|item| self.aliases(&item)).unwrap_or_default();
         let node = self.node(&section);
         let program = program(&section);
-        let optional = section.get("optional").and_then(|item| item.flag()).unwrap_or(false);
+        let optional = section.or("optional", false, Item::flag);
         let required = required(&section, optional);
         let calls = section.get("calls").map(|item| Calls::read(&item, self.directory, &what)).unwrap_or_default();
         let settings = settings(&section).unwrap_or_default();
-        let start = section.get("start").and_then(|item| item.choice(&[("on", Start::On), ("off", Start::Off)]));
+        let start = section.or("start", Start::On, |item| item.choice(&[("on", Start::On), ("off", Start::Off)]));
         let restart = section.get("restart").map(|item| Restart::read(&item, &what)).unwrap_or_default();
-        let ready_within = section.get("ready-within").and_then(|item| item.duration_above_zero("10 s"));
+        let ready_within = section.or("ready-within", READY_WITHIN, |item| item.duration_above_zero("10 s"));
         let stop_within = section.get("stop-within").and_then(|item| item.duration_above_zero("2 s"));
-        let busy_after = section.get("busy-after").and_then(|item| item.duration_above_zero("1 s"));
-        let spin = section.get("spin").and_then(|item| spin(&item)).unwrap_or_default();
+        let busy_after = section.or("busy-after", BUSY_AFTER, |item| item.duration_above_zero("1 s"));
+        let spin = section.or("spin", Duration::ZERO, spin);
         let boxes = section.section("mailbox", &format!("{what}, mailbox"));
         let (mailboxes, mailbox_lines) = Mailboxes::read(boxes, &what, section.line);
         let streams = StreamSpec::read_all(section.section("stream", &format!("{what}, stream")), &what);
@@ -243,10 +246,10 @@ impl Context<'_> {
             calls: calls.names,
             downwards: calls.downwards,
             settings,
-            start: start.unwrap_or_default(),
+            start,
             restart,
-            ready_within: ready_within.unwrap_or(Duration::from_secs(10)),
-            busy_after: busy_after.unwrap_or(BUSY_AFTER),
+            ready_within,
+            busy_after,
             spin,
             mailboxes,
             streams,
@@ -387,13 +390,10 @@ impl Restart {
             return restart;
         }
         let Some(section) = item.section(&format!("{what}, restart")) else { return restart };
-        restart.policy = section.get("policy").and_then(|item| item.choice(&words)).unwrap_or(restart.policy);
-        let backoff = section.get("backoff").and_then(|item| item.duration("200 ms"));
-        restart.backoff = backoff.unwrap_or(restart.backoff);
-        let at_most = section.get("at-most").and_then(|item| item.whole(1..=1000, 5));
-        restart.at_most = at_most.map_or(restart.at_most, |at_most| at_most as u32);
-        let within = section.get("within").and_then(|item| item.duration_above_zero("60 s"));
-        restart.within = within.unwrap_or(restart.within);
+        restart.policy = section.or("policy", restart.policy, |item| item.choice(&words));
+        restart.backoff = section.or("backoff", restart.backoff, |item| item.duration("200 ms"));
+        restart.at_most = section.whole_or("at-most", 1..=1000, restart.at_most);
+        restart.within = section.or("within", restart.within, |item| item.duration_above_zero("60 s"));
         section.finish();
         restart
     }

@@ -20,10 +20,10 @@ const CHOICES: &str = "write `security = \"keys\"` (what passes between nodes is
                        what it takes), or `security = \"none\"` (it is neither sealed nor signed, and anyone on the \
                        network may read and send)";
 const PORT: u16 = 21_117;
-const MTU: i64 = 1500;
-const MTUS: RangeInclusive<i64> = 576..=65_535;
+const MTU: u16 = 1500;
+const MTUS: RangeInclusive<u16> = 576..=65_535;
 /// Every link with IPv6 carries datagrams of this size (RFC 8200).
-const MTU_V6_MIN: i64 = 1280;
+const MTU_V6_MIN: u16 = 1280;
 const RATE: u64 = 100 << 20;
 /// At the least rate a largest package takes a second, two thirds of the longest wait of a package.
 const RATES: RangeInclusive<u64> = 64 << 10..=64 << 30;
@@ -40,13 +40,13 @@ pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) ->
         );
     }
     let security = read_security(&section);
-    let port = section.get("port").and_then(|item| item.whole(1024..=65_532, PORT.into()));
+    let port = section.whole_or("port", 1024..=65_532, PORT);
     let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
     let least = if is_v6 { MTU_V6_MIN } else { *MTUS.start() };
-    let mtu = section.get("mtu").and_then(|item| item.whole(least..=*MTUS.end(), MTU)).unwrap_or(MTU) as usize;
+    let mtu = section.whole_or("mtu", least..=*MTUS.end(), MTU);
     // The readers of the slots and of the keys' folder validate these.
     let _ = (section.get("mode"), section.get("keys"));
-    let rate = section.get("rate").and_then(|item| match tdma {
+    let rate = section.or("rate", RATE, |item| match tdma {
         None => item.size(RATES, "100 MiB"),
         Some(tdma) => {
             let link = rate_text(tdma.link_bytes_s * 8);
@@ -56,18 +56,18 @@ pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) ->
             None
         }
     });
-    let quota = section.get("quota").and_then(|item| item.size(QUOTAS, "256 KiB"));
-    let bulk = section.get("bulk-below").and_then(|item| item.whole(0..=255, BULK_BELOW.into()));
+    let quota = section.or("quota", QUOTA, |item| item.size(QUOTAS, "256 KiB"));
+    let bulk_below = section.whole_or("bulk-below", 0..=255, BULK_BELOW);
     section.finish();
     let around = Network::around_bytes(is_v6, security);
     Network {
         security,
-        port: port.map_or(PORT, |port| port as u16),
-        mtu: mtu as u16,
-        datagram_bytes_max: (mtu - around).min(PAYLOAD_MAX - security.tag_bytes()),
-        rate_bytes_s: tdma.map_or(rate.unwrap_or(RATE), |tdma| tdma.link_bytes_s),
-        quota_bytes: quota.unwrap_or(QUOTA) as usize,
-        bulk_below: bulk.map_or(BULK_BELOW, |bulk| bulk as u8),
+        port,
+        mtu,
+        datagram_bytes_max: (usize::from(mtu) - around).min(PAYLOAD_MAX - security.tag_bytes()),
+        rate_bytes_s: tdma.map_or(rate, |tdma| tdma.link_bytes_s),
+        quota_bytes: quota as usize,
+        bulk_below,
     }
 }
 

@@ -1,6 +1,6 @@
 //! The system and its nodes: its computers, and the tool instances of each.
 
-use crate::reader::{Item, Section, is_word};
+use crate::reader::{Item, Section, is_word, nearest};
 use std::net::IpAddr;
 use std::ops::RangeInclusive;
 
@@ -49,6 +49,16 @@ pub(crate) fn on_lan(nodes: &[Node]) -> &[Node] {
     &nodes[..nodes.iter().take_while(|node| node.reach == Reach::Lan).count()]
 }
 
+/// The place of the node with this name in the file, or what is wrong with the name.
+pub(crate) fn place(nodes: &[Node], name: &str) -> Result<u8, String> {
+    let names = || nodes.iter().map(|node| node.name.as_str());
+    let place = names().zip(0..).find(|(known, _)| *known == name).map(|(_, place)| place);
+    place.ok_or_else(|| match nearest(name, names()) {
+        Some(known) => format!("there is no node `{name}`; did you mean `{known}`?"),
+        None => format!("there is no node `{name}`; the nodes are {}", names().collect::<Vec<_>>().join(", ")),
+    })
+}
+
 impl System {
     pub(crate) fn read(section: Option<Section<'_>>) -> Self {
         let mut system = Self { name: "robot".into(), id: 1 };
@@ -58,7 +68,7 @@ impl System {
         }
         // 0 means one's own system, 255 all systems.
         if let Some(id) = section.required("id", "id = 1").and_then(|item| item.whole(1..=254, 1)) {
-            system.id = id as u8;
+            system.id = id;
         }
         section.finish();
         system
@@ -100,8 +110,7 @@ impl Node {
             item.report(format!("`{name}` is no node name; use lower-case letters, digits and `-`, a letter first"));
         }
         let section = item.section(&format!("node `{name}`"))?;
-        let reach = section.get("network").and_then(|item| item.choice(&[(LAN, Reach::Lan), (TCP, Reach::Tcp)]));
-        let reach = reach.unwrap_or(Reach::Lan);
+        let reach = section.or("network", Reach::Lan, |item| item.choice(&[(LAN, Reach::Lan), (TCP, Reach::Tcp)]));
         let address = match (section.get("address"), reach) {
             (Some(item), Reach::Tcp) => {
                 item.report(
@@ -122,7 +131,7 @@ impl Node {
             }
             (None, _) => None,
         };
-        let mode = section.get("mode").and_then(|item| read_mode(&item)).unwrap_or(0o700);
+        let mode = section.or("mode", 0o700, read_mode);
         let tools = match section.get("tools") {
             Some(item) => read_tools(&item, earlier),
             None if alone.at_all => Some(0..=63),
@@ -206,7 +215,7 @@ fn read_tools(item: &Item<'_>, earlier: &[Node]) -> Option<RangeInclusive<u8>> {
         ));
         return None;
     };
-    let (first, last) = (first.whole(0..=255, 0)? as u8, last.whole(0..=255, 63)? as u8);
+    let (first, last) = (first.whole(0..=255, 0)?, last.whole(0..=255, 63)?);
     if first > last {
         item.report(format!("`tools` ends before it begins; write `tools = [{last}, {first}]`"));
         return None;

@@ -1,7 +1,7 @@
 //! Settings of the output service: what it keeps, and from which level on.
 
 use crate::directory::Directory;
-use crate::reader::Section;
+use crate::reader::{Item, Section};
 use rohrpost_mailbox::Name;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -100,8 +100,7 @@ impl Output {
     pub(crate) fn read(section: Option<Section<'_>>, directory: &Directory<'_>, folder: &Path) -> Self {
         let mut output = Self::default();
         let Some(section) = section else { return output };
-        let level = section.get("level").and_then(|item| item.choice(&LEVELS));
-        output.level = level.unwrap_or(output.level);
+        output.level = section.or("level", output.level, |item| item.choice(&LEVELS));
         if let Some(levels) = section.section("levels", "[output] levels") {
             for item in levels.entries() {
                 let level = item.choice(&LEVELS);
@@ -113,34 +112,26 @@ impl Output {
                 }
             }
         }
-        let whole = |key, range, usual: u32| {
-            let number = section.get(key).and_then(|item| item.whole(range, usual.into()));
-            number.map_or(usual, |number| number as u32)
-        };
-        output.rate = whole("rate", 1..=1_000_000, output.rate);
-        output.burst = whole("burst", 1..=100_000, output.burst);
-        output.ring = whole("ring", 1..=1_000_000, output.ring);
+        output.rate = section.whole_or("rate", 1..=1_000_000, output.rate);
+        output.burst = section.whole_or("burst", 1..=100_000, output.burst);
+        output.ring = section.whole_or("ring", 1..=1_000_000, output.ring);
         output.file = section.get("file").and_then(|item| item.text("robot.log")).map(|file| folder.join(file));
         output.read_file_keys(&section);
-        output.journal = section.get("journal").and_then(|item| item.flag()).unwrap_or(false);
+        output.journal = section.or("journal", false, Item::flag);
         section.finish();
         output
     }
 
     /// Keys of the file have no meaning without one.
     fn read_file_keys(&mut self, section: &Section<'_>) {
-        let size = section.get("file-size");
-        let files = section.get("files");
-        let format = section.get("format");
+        let keys = ["file-size", "files", "format"];
         if self.file.is_none() && section.get("file").is_none() {
-            for item in [&size, &files, &format].into_iter().flatten() {
+            for item in keys.into_iter().filter_map(|key| section.get(key)) {
                 item.report(format!("`{}` is about a file, and there is none; add `file = \"robot.log\"`", item.key));
             }
         }
-        let size = size.and_then(|item| item.size(FILE_SIZE, "10 MiB"));
-        self.file_size = size.unwrap_or(self.file_size);
-        let files = files.and_then(|item| item.whole(0..=1000, 4));
-        self.files = files.map_or(self.files, |files| files as u32);
-        self.format = format.and_then(|item| item.choice(&FORMATS)).unwrap_or(self.format);
+        self.file_size = section.or("file-size", self.file_size, |item| item.size(FILE_SIZE, "10 MiB"));
+        self.files = section.whole_or("files", 0..=1000, self.files);
+        self.format = section.or("format", self.format, |item| item.choice(&FORMATS));
     }
 }

@@ -4,8 +4,9 @@
 
 use crate::errors::Problem;
 use crate::line_ends::LineEnds;
-use crate::units;
+use crate::units::{self, UnitError};
 use std::cell::{OnceCell, RefCell};
+use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 use toml::Spanned;
@@ -13,6 +14,11 @@ use toml::de::{DeTable, DeValue};
 
 /// Longest duration in a file: a longer one is a mistaken unit.
 const DURATION_MAX: Duration = Duration::from_secs(24 * 3600);
+
+/// A whole number of the file.
+pub(crate) trait Whole: TryFrom<i64> + PartialOrd + Display + Copy {}
+
+impl<T: TryFrom<i64> + PartialOrd + Display + Copy> Whole for T {}
 
 /// The file, and its mistakes so far.
 pub(crate) struct Reader<'d> {
@@ -75,19 +81,19 @@ fn bracket_left_open(text: &str) -> Option<(usize, char)> {
     let mut open: Vec<(usize, char)> = Vec::new();
     let mut at = 0;
     while let Some(c) = text[at..].chars().next() {
-        let bytes = match c {
+        at += match c {
             '#' => text[at..].find('\n').unwrap_or(text.len() - at),
             '"' | '\'' => string_bytes(&text[at..], c),
-            _ => c.len_utf8(),
-        };
-        match c {
-            '[' | '{' => open.push((at, c)),
+            '[' | '{' => {
+                open.push((at, c));
+                1
+            }
             ']' | '}' => {
                 open.pop();
+                1
             }
-            _ => {}
-        }
-        at += bytes;
+            _ => c.len_utf8(),
+        };
     }
     open.first().copied()
 }
@@ -156,6 +162,16 @@ impl<'d> Section<'d> {
         entries.iter().map(|(key, value)| self.item(key.get_ref(), self.reader.line(key.span()), value)).collect()
     }
 
+    /// What `read` makes of the value of a key; `usual` if there is none, or a wrong one.
+    pub(crate) fn or<T>(&self, key: &'static str, usual: T, read: impl FnOnce(&Item<'d>) -> Option<T>) -> T {
+        self.get(key).and_then(|item| read(&item)).unwrap_or(usual)
+    }
+
+    /// The same of a whole number.
+    pub(crate) fn whole_or<T: Whole>(&self, key: &'static str, range: RangeInclusive<T>, usual: T) -> T {
+        self.or(key, usual, |item| item.whole(range, usual))
+    }
+
     /// A table below this one, if it is there.
     pub(crate) fn section(&self, key: &'static str, what: &str) -> Option<Self> {
         self.get(key)?.section(what)
@@ -184,6 +200,7 @@ impl<'d> Section<'d> {
 }
 
 /// The value of a key, or one element of a list.
+#[derive(Clone)]
 pub(crate) struct Item<'d> {
     pub(crate) reader: &'d Reader<'d>,
     pub(crate) what: String,
@@ -221,9 +238,9 @@ impl<'d> Item<'d> {
         self.value.get_ref().as_bool().or_else(|| self.wrong("true or false"))
     }
 
-    pub(crate) fn whole(&self, range: RangeInclusive<i64>, example: i64) -> Option<i64> {
+    pub(crate) fn whole<T: Whole>(&self, range: RangeInclusive<T>, example: T) -> Option<T> {
         let number = self.value.get_ref().as_integer().and_then(|i| i64::from_str_radix(i.as_str(), i.radix()).ok());
-        number.filter(|number| range.contains(number)).or_else(|| {
+        number.and_then(|number| T::try_from(number).ok()).filter(|number| range.contains(number)).or_else(|| {
             let (first, last) = (range.start(), range.end());
             self.wrong(&format!("a whole number from {first} to {last}, such as `{} = {example}`", self.key))
         })
@@ -261,59 +278,47 @@ impl<'d> Item<'d> {
         })
     }
 
-    pub(crate) fn duration(&self, example: &str) -> Option<Duration> {
+    /// What a text with a unit says.
+    fn measure<T>(&self, what: &str, example: &str, parse: fn(&str) -> Result<T, UnitError>) -> Option<T> {
         let Some(text) = self.value.get_ref().as_str() else {
-            return self.wrong(&format!("a duration with its unit, such as `{} = \"{example}\"`", self.key));
+            return self.wrong(&format!("a {what} with its unit, such as `{} = \"{example}\"`", self.key));
         };
-        match units::parse_duration(text) {
-            Ok(duration) if duration <= DURATION_MAX => Some(duration),
-            Ok(_) => self.wrong("at most a day, \"24 h\""),
-            Err(error) => {
-                self.report(format!("`{}`: {error}", self.key));
-                None
-            }
-        }
+        parse(text).inspect_err(|error| self.report(format!("`{}`: {error}", self.key))).ok()
+    }
+
+    pub(crate) fn duration(&self, example: &str) -> Option<Duration> {
+        let duration = self.measure("duration", example, units::parse_duration)?;
+        if duration <= DURATION_MAX { Some(duration) } else { self.wrong("at most a day, \"24 h\"") }
     }
 
     /// A duration of at least a microsecond.
     pub(crate) fn duration_above_zero(&self, example: &str) -> Option<Duration> {
+        self.duration_of_at_least(Duration::from_micros(1), example)
+    }
+
+    pub(crate) fn duration_of_at_least(&self, least: Duration, example: &str) -> Option<Duration> {
         let duration = self.duration(example)?;
-        if duration < Duration::from_micros(1) {
-            return self.wrong(&format!("at least \"1 us\", for example `{} = \"{example}\"`", self.key));
+        if duration < least {
+            let least = units::duration_text(least);
+            return self.wrong(&format!("at least \"{least}\", for example `{} = \"{example}\"`", self.key));
         }
         Some(duration)
     }
 
     pub(crate) fn size(&self, range: RangeInclusive<u64>, example: &str) -> Option<u64> {
-        let Some(text) = self.value.get_ref().as_str() else {
-            return self.wrong(&format!("a size with its unit, such as `{} = \"{example}\"`", self.key));
-        };
-        match units::parse_size(text) {
-            Ok(size) if range.contains(&size) => Some(size),
-            Ok(_) => self.wrong(&format!("{} to {} B, such as \"{example}\"", range.start(), range.end())),
-            Err(error) => {
-                self.report(format!("`{}`: {error}", self.key));
-                None
-            }
-        }
+        let size = self.measure("size", example, units::parse_size)?;
+        let right = || format!("{} to {} B, such as \"{example}\"", range.start(), range.end());
+        if range.contains(&size) { Some(size) } else { self.wrong(&right()) }
     }
 
     /// The rate of a link, in bits a second.
     pub(crate) fn rate(&self, range: RangeInclusive<u64>, example: &str) -> Option<u64> {
-        let Some(text) = self.value.get_ref().as_str() else {
-            return self.wrong(&format!("a rate with its unit, such as `{} = \"{example}\"`", self.key));
-        };
-        match units::parse_rate(text) {
-            Ok(rate) if range.contains(&rate) => Some(rate),
-            Ok(_) => self.wrong(&format!(
-                "{} to {}, such as \"{example}\"",
-                units::rate_text(*range.start()),
-                units::rate_text(*range.end())
-            )),
-            Err(error) => {
-                self.report(format!("`{}`: {error}", self.key));
-                None
-            }
+        let rate = self.measure("rate", example, units::parse_rate)?;
+        let [least, most] = [range.start(), range.end()].map(|rate| units::rate_text(*rate));
+        if range.contains(&rate) {
+            Some(rate)
+        } else {
+            self.wrong(&format!("{least} to {most}, such as \"{example}\""))
         }
     }
 
@@ -322,14 +327,8 @@ impl<'d> Item<'d> {
         let Some(array) = self.value.get_ref().as_array() else {
             return self.wrong(&format!("a list, such as `{} = {example}`", self.key));
         };
-        let element = |value: &'d Spanned<DeValue<'d>>| Self {
-            reader: self.reader,
-            what: self.what.clone(),
-            key: self.key.clone(),
-            line: self.reader.line(value.span()),
-            value,
-        };
-        Some(array.iter().map(element).collect())
+        let line = |value: &Spanned<DeValue<'d>>| self.reader.line(value.span());
+        Some(array.iter().map(|value| Self { line: line(value), value, ..self.clone() }).collect())
     }
 
     /// The texts of a list, with the lines they stand in.

@@ -19,7 +19,7 @@ const OUTPUT: &str = "output";
 /// A smaller file would hold little but what each begins with.
 const ROTATE_SIZE: RangeInclusive<u64> = 1 << 20..=1 << 40;
 /// Of everything, one in so many at the least.
-const EVERY_MAX: i64 = 1_000_000;
+const EVERY_MAX: u32 = 1_000_000;
 const RATE_HZ: RangeInclusive<f64> = 0.001..=1000.0;
 /// How much is drawn of each item, unless the file says it.
 const DRAWN_HZ: f64 = 10.0;
@@ -111,14 +111,15 @@ impl Recording {
                 );
             }
         }
-        let output = section.get("output").and_then(|item| output(&item)).flatten();
-        let drawn = section.get("drawn").and_then(|item| drawn(&item)).flatten();
+        let output = section.or("output", None, output);
+        let drawn = section.or("drawn", None, drawn);
         let exact = exact::read(&section, directory);
-        let rotate_size = section.get("rotate-size").and_then(|item| item.size(ROTATE_SIZE, "1 GiB"));
-        let rotate_after = section.get("rotate-after").and_then(|item| at_least_a_second(&item, "1 h"));
-        let leave_free = section.get("leave-free").and_then(|item| item.size(0..=1 << 50, "256 MiB"));
-        let flush = section.get("flush").and_then(|item| item.duration_above_zero("500 ms"));
-        let sync = section.get("sync").and_then(|item| item.duration_above_zero("2 s"));
+        let rotate_size = section.or("rotate-size", 1 << 30, |item| item.size(ROTATE_SIZE, "1 GiB"));
+        let (second, hour) = (Duration::from_secs(1), Duration::from_secs(3600));
+        let rotate_after = section.or("rotate-after", hour, |item| item.duration_of_at_least(second, "1 h"));
+        let leave_free = section.or("leave-free", 256 << 20, |item| item.size(0..=1 << 50, "256 MiB"));
+        let flush = section.or("flush", Duration::from_millis(500), |item| item.duration_above_zero("500 ms"));
+        let sync = section.or("sync", Duration::from_secs(2), |item| item.duration_above_zero("2 s"));
         let control = log_control::read(&section);
         let line = section.line;
         section.finish();
@@ -129,11 +130,11 @@ impl Recording {
             output,
             drawn,
             exact,
-            rotate_size: rotate_size.unwrap_or(1 << 30),
-            rotate_after: rotate_after.unwrap_or(Duration::from_secs(3600)),
-            leave_free: leave_free.unwrap_or(256 << 20),
-            flush: flush.unwrap_or(Duration::from_millis(500)),
-            sync: sync.unwrap_or(Duration::from_secs(2)),
+            rotate_size,
+            rotate_after,
+            leave_free,
+            flush,
+            sync,
             control,
             line,
         })
@@ -195,14 +196,6 @@ fn drawn(item: &Item<'_>) -> Option<Option<f64>> {
     }
 }
 
-fn at_least_a_second(item: &Item<'_>, example: &str) -> Option<Duration> {
-    let duration = item.duration(example)?;
-    if duration < Duration::from_secs(1) {
-        return item.wrong(&format!("at least \"1 s\", for example `{} = \"{example}\"`", item.key));
-    }
-    Some(duration)
-}
-
 impl RecordedItems {
     /// How exactly it names an item: the item itself goes before its module, and that before all. The greater one
     /// counts.
@@ -217,9 +210,8 @@ impl RecordedItems {
     }
 
     fn read_all(section: &Section<'_>, key: &'static str, example: &str, directory: &Directory<'_>) -> Vec<Self> {
-        let items = section.get(key).and_then(|item| item.list(example)).unwrap_or_default();
         let mut all: Vec<Self> = Vec::new();
-        for item in &items {
+        for item in &section.or(key, Vec::new(), |item| item.list(example)) {
             let Some(read) = Self::read(item, "[record]", directory) else { continue };
             if let Some(first) = all.iter().find(|first| (first.from, &first.item) == (read.from, &read.item)) {
                 let text = read.text(directory.classes);
@@ -246,10 +238,7 @@ impl RecordedItems {
             ));
             return None;
         };
-        let from = directory.find(module);
-        if let Err(unknown) = &from {
-            item.report(format!("`{module}` is no [[module]]; {}", unknown.or("drop the entry")));
-        }
+        let from = directory.module(item, module);
         let is_name = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         if name != "*" && (name.is_empty() || !is_name) {
             item.report(format!(
@@ -257,7 +246,7 @@ impl RecordedItems {
             ));
             return None;
         }
-        Some(Self { from: Some(from.ok()?), item: (name != "*").then(|| name.into()), sampling, line })
+        Some(Self { from: Some(from?), item: (name != "*").then(|| name.into()), sampling, line })
     }
 }
 
@@ -268,7 +257,7 @@ fn sampled<'d>(item: &Item<'d>, section: &str) -> Option<(&'d str, Sampling)> {
     let every = section.get("every");
     let rate = section.get("rate");
     let sampling = match (&every, &rate) {
-        (Some(every), None) => every.whole(1..=EVERY_MAX, 10).map(|every| Sampling::Every(every as u32)),
+        (Some(every), None) => every.whole(1..=EVERY_MAX, 10).map(Sampling::Every),
         (None, Some(rate)) => rate.number(RATE_HZ, "2.0").map(Sampling::Rate),
         (None, None) => {
             item.report("write which values: `every = 10`, or `rate = 2.0`; for each of them, write the name alone");

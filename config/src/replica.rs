@@ -2,7 +2,7 @@
 
 use crate::directory::Directory;
 use crate::node::Node;
-use crate::reader::{Section, nearest};
+use crate::reader::{Item, Section, nearest};
 use crate::record::{RecordedItems, Sampling};
 use rohrpost_mailbox::Name;
 use std::time::Duration;
@@ -51,21 +51,17 @@ impl Replica {
         });
         let to = section.required("to", "to = [\"brain\"]");
         let to = to.and_then(|item| {
-            let named = item.list("[\"brain\"]")?;
-            let texts: Vec<_> =
-                named.iter().filter_map(|item| Some((item.text_of_list("brain")?, item.line))).collect();
-            if named.is_empty() {
+            if item.list("[\"brain\"]")?.is_empty() {
                 item.report("`to` names no node; write for example `to = [\"brain\"]`, or drop the replica");
             }
-            Some(destinations(&section, &texts, nodes))
+            Some(destinations(&section, &item.texts("brain"), nodes))
         });
-        let changed = section.get("changed").and_then(|item| item.flag()).unwrap_or(false);
-        let delay_alarm = section.get("delay-alarm").and_then(|item| item.duration_above_zero("5 ms"));
-        let deadline = section.get("deadline").and_then(|item| item.duration("200 ms"));
+        let changed = section.or("changed", false, Item::flag);
+        let delay_alarm = section.or("delay-alarm", DELAY_ALARM, |item| item.duration_above_zero("5 ms"));
+        let deadline = section.or("deadline", DEADLINE, |item| item.duration("200 ms"));
         let line = section.line;
         section.finish();
         let ((from, item, sampling), to) = (stream?, to?);
-        let (delay_alarm, deadline) = (delay_alarm.unwrap_or(DELAY_ALARM), deadline.unwrap_or(DEADLINE));
         Some(Self { from, item, to, sampling, changed, delay_alarm, deadline, line })
     }
 

@@ -49,12 +49,10 @@ impl Default for SchedulingRule {
 impl SchedulingRule {
     pub(crate) fn read(section: Option<Section<'_>>) -> Self {
         let Some(section) = section else { return Self::default() };
-        let from = section.get("real-time-from").and_then(|item| item.whole(1..=256, REAL_TIME_FROM.into()));
-        let real_time_from = from.map_or(REAL_TIME_FROM, |from| from as u16);
-        let nice = section.get("nice-below");
-        let below = nice.as_ref().and_then(|item| item.whole(1..=256, NICE_BELOW.into())).map(|below| below as u16);
-        let nice_below = below.unwrap_or(NICE_BELOW.min(real_time_from));
-        if let Some(item) = nice.filter(|_| nice_below > real_time_from) {
+        let real_time_from = section.whole_or("real-time-from", 1..=256, REAL_TIME_FROM);
+        let usual = NICE_BELOW.min(real_time_from);
+        let nice_below = section.or("nice-below", usual, |item| item.whole(1..=256, NICE_BELOW));
+        if let Some(item) = section.get("nice-below").filter(|_| nice_below > real_time_from) {
             item.report(format!(
                 "`nice-below` {nice_below} is above `real-time-from` {real_time_from}, and a class cannot be both; \
                  write at most {real_time_from}"

@@ -48,14 +48,11 @@ impl StreamSpec {
     fn read(item: &Item<'_>, module: &str) -> Option<Self> {
         let section = item.section(&format!("{module}, stream `{}`", item.key))?;
         let mut spec = Self::default();
-        let record = section.get("record").and_then(|item| item.size(1..=RECORD_BYTES_MAX.into(), "8 MiB"));
-        spec.record_bytes = record.map_or(spec.record_bytes, |record| record as u32);
-        let keep = section.get("keep").and_then(|item| item.whole(2..=STREAM_KEEP_MAX.into(), spec.keep.into()));
-        spec.keep = keep.map_or(spec.keep, |keep| keep as u32);
-        let readers = section.get("readers");
-        let readers = readers.and_then(|item| item.whole(1..=STREAM_READERS_MAX as i64, spec.readers.into()));
-        spec.readers = readers.map_or(spec.readers, |readers| readers as u16);
-        spec.late = section.get("late").and_then(|item| late(&item)).unwrap_or(spec.late);
+        let record = |item: &Item<'_>| item.size(1..=RECORD_BYTES_MAX.into(), "8 MiB");
+        spec.record_bytes = section.or("record", spec.record_bytes.into(), record) as u32;
+        spec.keep = section.whole_or("keep", 2..=STREAM_KEEP_MAX, spec.keep);
+        spec.readers = section.whole_or("readers", 1..=STREAM_READERS_MAX as u16, spec.readers);
+        spec.late = section.or("late", spec.late, late);
         section.finish();
         Some(spec)
     }

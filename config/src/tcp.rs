@@ -17,8 +17,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 const PORT: u16 = 21_119;
-const CLIENTS: i64 = 256;
-const CLIENTS_MAX: i64 = 4096;
+const CLIENTS: u16 = 256;
+const CLIENTS_MAX: u16 = 4096;
 const QUOTA: u64 = 1 << 20;
 /// Two largest packages, so that the second does not push the first out.
 const QUOTAS: RangeInclusive<u64> = 128 << 10..=64 << 20;
@@ -92,8 +92,7 @@ impl Tcp {
             }
             address
         });
-        let port = section.get("port").and_then(|item| item.whole(1024..=65_535, PORT.into()));
-        let port = port.map_or(PORT, |port| port as u16);
+        let port = section.whole_or("port", 1024..=65_535, PORT);
         let server = section.get("server").and_then(|item| {
             let name = item.text("base")?;
             let known: Vec<String> = nodes.iter().map(|node| format!("`{}`", node.name)).collect();
@@ -106,19 +105,12 @@ impl Tcp {
             }
             Some(name.to_owned())
         });
-        let clients = section.get("clients").and_then(|item| item.whole(1..=CLIENTS_MAX, CLIENTS)).unwrap_or(CLIENTS);
-        let quota = section.get("quota").and_then(|item| item.size(QUOTAS, "1 MiB"));
-        let bulk = section.get("bulk-below").and_then(|item| item.whole(0..=255, BULK_BELOW.into()));
+        let clients = section.whole_or("clients", 1..=CLIENTS_MAX, CLIENTS);
+        let quota_bytes = section.or("quota", QUOTA, |item| item.size(QUOTAS, "1 MiB")) as usize;
+        let bulk_below = section.whole_or("bulk-below", 0..=255, BULK_BELOW);
         section.finish();
         let address = SocketAddr::new(address.unwrap_or(IpAddr::from([127, 0, 0, 1])), port);
-        Self {
-            address,
-            certificates,
-            server,
-            clients: clients as u16,
-            quota_bytes: quota.unwrap_or(QUOTA) as usize,
-            bulk_below: bulk.map_or(BULK_BELOW, |bulk| bulk as u8),
-        }
+        Self { address, certificates, server, clients, quota_bytes, bulk_below }
     }
 }
 

@@ -4,8 +4,8 @@ mod validate;
 
 pub(crate) use validate::validate;
 
-use crate::node::Node;
-use crate::reader::{Item, Section, nearest};
+use crate::node::{self, Node};
+use crate::reader::{Item, Section};
 use rohrpost_network::{Tdma, TimeSlot, Tunnel};
 use std::net::Ipv4Addr;
 use std::ops::RangeInclusive;
@@ -20,7 +20,7 @@ const GUARD: Duration = Duration::from_micros(150);
 const LINK_BITS_S: u64 = 100_000_000;
 const LINKS: RangeInclusive<u64> = 1_000_000..=100_000_000_000;
 /// Longest period of the table in cycles: checks of all of them must end.
-const PERIODS: RangeInclusive<i64> = 1..=64;
+const PERIODS: RangeInclusive<u32> = 1..=64;
 /// A network of so many bits leaves addresses for a node at least, and for all at most.
 const PREFIXES: RangeInclusive<u8> = 8..=30;
 
@@ -95,22 +95,16 @@ pub(crate) fn read(file: &Section<'_>, slots: Vec<Section<'_>>, nodes: &[Node]) 
     let cycle = section.required("cycle", "cycle = \"5 ms\"").and_then(|item| read_cycle(&item));
     let link = section.required("link", "link = \"100 Mbit/s\"");
     let link = link.and_then(|item| item.rate(LINKS, "100 Mbit/s")).unwrap_or(LINK_BITS_S);
-    let synchronisation = section.get("synchronisation").and_then(|item| item.duration_above_zero("500 us"));
-    let guard = section.get("guard").and_then(|item| item.duration_above_zero("150 us"));
+    let synchronisation = section.or("synchronisation", SYNCHRONISATION, |item| item.duration_above_zero("500 us"));
+    let guard = section.or("guard", GUARD, |item| item.duration_above_zero("150 us"));
     let tunnel = section.get("tunnel").and_then(|item| read_tunnel(&item, nodes));
     let mut slots: Vec<_> = slots.into_iter().filter_map(|slot| read_slot(slot, nodes)).collect();
     slots.sort_by_key(|(slot, _)| (slot.offset, slot.phase));
     let (slots, slot_lines) = slots.into_iter().unzip();
     let lines = TdmaLines { table: section.line, slots: slot_lines };
     section.finish();
-    let tdma = Tdma {
-        cycle: cycle.unwrap_or(CYCLE),
-        synchronisation: synchronisation.unwrap_or(SYNCHRONISATION),
-        guard: guard.unwrap_or(GUARD),
-        link_bytes_s: link / 8,
-        slots,
-        tunnel,
-    };
+    let cycle = cycle.unwrap_or(CYCLE);
+    let tdma = Tdma { cycle, synchronisation, guard, link_bytes_s: link / 8, slots, tunnel };
     Some((tdma, lines))
 }
 
@@ -168,19 +162,9 @@ fn read_slot(section: Section<'_>, nodes: &[Node]) -> Option<(TimeSlot, usize)> 
     section.finish();
     let phase = phase.map_or(Some(0), |(phase, _)| phase);
     let (node, offset, length) = (node?, offset?, length?);
-    Some((TimeSlot { node, offset, length, period: period? as u32, phase: phase? as u32 }, line))
+    Some((TimeSlot { node, offset, length, period: period?, phase: phase? }, line))
 }
 fn read_node(item: &Item<'_>, nodes: &[Node]) -> Option<u8> {
     let text = item.text("base")?;
-    let names = || nodes.iter().map(|node| node.name.as_str());
-    let index = names().zip(0..).find(|(name, _)| *name == text).map(|(_, index)| index);
-    if index.is_none() {
-        item.report(match nearest(text, names()) {
-            Some(known) => format!("`node`: there is no node `{text}`; did you mean `{known}`?"),
-            None => {
-                format!("`node`: there is no node `{text}`; the nodes are {}", names().collect::<Vec<_>>().join(", "))
-            }
-        });
-    }
-    index
+    node::place(nodes, text).inspect_err(|missing| item.report(format!("`node`: {missing}"))).ok()
 }

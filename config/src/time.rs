@@ -1,7 +1,7 @@
 //! Where system time comes from.
 
 use crate::node::{self, Node, Reach};
-use crate::reader::{Item, Section, nearest};
+use crate::reader::{Item, Section};
 use crate::units::duration_text;
 use std::time::Duration;
 
@@ -163,20 +163,15 @@ impl TimeSource {
 }
 
 fn read_masters(list: &Item<'_>, nodes: &[Node]) -> Vec<u8> {
-    let names = || nodes.iter().map(|node| node.name.as_str());
     let mut masters: Vec<u8> = Vec::new();
     for (text, line) in list.texts("base") {
-        let index = names().zip(0..).find(|(name, _)| *name == text).map(|(_, index)| index);
-        let wrong = match (index, nearest(text, names())) {
-            (Some(index), _) if !masters.contains(&index) => {
-                masters.push(index);
+        let wrong = match node::place(nodes, text) {
+            Ok(place) if !masters.contains(&place) => {
+                masters.push(place);
                 continue;
             }
-            (Some(_), _) => format!("names `{text}` twice; drop one"),
-            (None, Some(known)) => format!("there is no node `{text}`; did you mean `{known}`?"),
-            (None, None) => {
-                format!("there is no node `{text}`; the nodes are {}", names().collect::<Vec<_>>().join(", "))
-            }
+            Ok(_) => format!("names `{text}` twice; drop one"),
+            Err(missing) => missing,
         };
         list.reader.report(line, format!("[time]: `masters`: {wrong}"));
     }

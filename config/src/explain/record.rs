@@ -11,9 +11,7 @@ impl Page<'_> {
     pub(super) fn record(&mut self) {
         let Some(record) = &self.installation.record else { return };
         let recorder = self.installation.recorder();
-        self.line("");
-        self.line("Recording");
-        self.line("");
+        self.title("Recording");
         if let Some(module) = recorder {
             let (name, node) = (self.name(module.name), &module.node);
             let directory = record.directory.display();
@@ -58,9 +56,7 @@ impl Page<'_> {
         if self.installation.replicas.is_empty() {
             return;
         }
-        self.line("");
-        self.line("Replicas");
-        self.line("");
+        self.title("Replicas");
         for replica in &self.installation.replicas {
             let node = self.installation.node_of(replica.from).unwrap_or_default();
             let asks = match replica.deadline {

@@ -13,9 +13,7 @@ impl Page<'_> {
     pub(super) fn slots(&mut self) {
         let Some(tdma) = &self.installation.tdma else { return };
         let masters = self.installation.time.masters();
-        self.line("");
-        self.line("Time slots. A node sends in its own only; a cycle begins at each multiple of its length.");
-        self.line("");
+        self.title("Time slots. A node sends in its own only; a cycle begins at each multiple of its length.");
         self.entry("cycle", &cycle(tdma));
         let (guard, late) = (duration_text(tdma.guard), duration_text(LATE));
         let mut words = format!(
@@ -68,9 +66,7 @@ impl Page<'_> {
         if bounds.is_empty() {
             return;
         }
-        self.line("");
-        self.line("At worst, from publishing to the arrival at the other node; then a process has to wake up:");
-        self.line("");
+        self.title("At worst, from publishing to the arrival at the other node; then a process has to wake up:");
         let flows: Vec<String> = bounds
             .iter()
             .map(|bound| {
@@ -112,9 +108,7 @@ impl Page<'_> {
         let all: Vec<_> = all.filter_map(|(planned, replica)| Some(((*planned)?, replica))).collect();
         let names: Vec<_> = all.iter().map(|(_, replica)| replica.text(self.installation)).collect();
         let Some(width) = names.iter().map(|name| name.chars().count()).max() else { return };
-        self.line("");
-        self.line("Replicas have what packages leave of the slots of their node, the more important first:");
-        self.line("");
+        self.title("Replicas have what packages leave of the slots of their node, the more important first:");
         let columns = "of node   left in 1 s    record  to   at least  records in 1 s";
         self.line(format!("  {:width$}  {columns}", "replica", width = width.max(7)));
         for ((planned, _), name) in all.into_iter().zip(names) {

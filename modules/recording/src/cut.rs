@@ -44,16 +44,14 @@ const EARLIER: usize = 1;
 pub fn cut(path: &Path, to: &Path, selection: &Selection, progress: &mut Progress<'_>) -> Result<(u64, u64), CutError> {
     let mut selected = Selected::open(path, selection)?;
     let mut new = Rewriter::create(to, &header_of_made([Contents::header_of(path)?.as_ref()]), [path])?;
-    selected.each_metadata(new.keeps_theirs(), |its| {
-        Ok::<_, CutError>(new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?)
-    })?;
+    selected.each_metadata(new.keeps_theirs(), |its| Ok::<_, CutError>(new.metadata(&its.name, &its.metadata)?))?;
     for attachment in selected.take_attachments() {
         let at = attachment.index.offset;
         new.attachment::<CutError>(path, attachment)?.map_err(|what| selected.damaged(at, what))?;
     }
-    new.metadata(metadata::CUT, &selection.about(path)).map_err(RewriteError::from)?;
+    new.metadata(metadata::CUT, &selection.about(path))?;
     for (id, channel) in selected.channels() {
-        new.channel(SELECTED, id, channel).map_err(RewriteError::from)?;
+        new.channel(SELECTED, id, channel)?;
     }
     let mut next = selected.next()?;
     if let Some(from_ns) = selection.from_ns {
@@ -64,12 +62,12 @@ pub fn cut(path: &Path, to: &Path, selection: &Selection, progress: &mut Progres
         let log_time = next.as_ref().map_or(from_ns, |found| found.header.log_time);
         for EarlierMessage { channel, header, data } in earlier.messages {
             let header = MessageHeader { log_time, ..header };
-            new.message(EARLIER, &channel, &header, &data).map_err(RewriteError::from)?;
+            new.message(EARLIER, &channel, &header, &data)?;
         }
     }
     while let Some(found) = next {
         progress(selected.at(), selected.file_bytes());
-        new.message(SELECTED, &found.channel, &found.header, selected.data(&found)).map_err(RewriteError::from)?;
+        new.message(SELECTED, &found.channel, &found.header, selected.data(&found))?;
         next = selected.next()?;
     }
     let messages = new.messages();

@@ -1,6 +1,7 @@
 //! What of MCAP a recording uses, and the names that only recordings of Rohrpost have.
 
 use mcap::records::Header;
+pub(crate) use mcap::records::op;
 use std::collections::BTreeMap;
 
 /// The header's profile.
@@ -85,25 +86,6 @@ pub mod key {
     /// Of a drawn channel with fewer pixels or points than what was recorded, so that nothing long is in a file twice:
     /// `true`.
     pub const REDUCED: &str = "reduced";
-}
-
-/// Operation codes of records.
-pub(crate) mod op {
-    pub(crate) const HEADER: u8 = 1;
-    pub(crate) const FOOTER: u8 = 2;
-    pub(crate) const SCHEMA: u8 = 3;
-    pub(crate) const CHANNEL: u8 = 4;
-    pub(crate) const MESSAGE: u8 = 5;
-    pub(crate) const CHUNK: u8 = 6;
-    pub(crate) const MESSAGE_INDEX: u8 = 7;
-    pub(crate) const CHUNK_INDEX: u8 = 8;
-    pub(crate) const ATTACHMENT: u8 = 9;
-    pub(crate) const ATTACHMENT_INDEX: u8 = 10;
-    pub(crate) const STATISTICS: u8 = 11;
-    pub(crate) const METADATA: u8 = 12;
-    pub(crate) const METADATA_INDEX: u8 = 13;
-    pub(crate) const SUMMARY_OFFSET: u8 = 14;
-    pub(crate) const DATA_END: u8 = 15;
 }
 
 /// What names of our metadata begin with.

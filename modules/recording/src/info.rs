@@ -22,7 +22,7 @@ use std::sync::Arc;
 pub type ForeignTexts = BTreeMap<ForeignText, ForeignText>;
 
 /// What is in a file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Info {
     /// The file.
     pub path: PathBuf,
@@ -260,29 +260,10 @@ fn build(contents: &Contents, tallies: &BTreeMap<u16, Tally>, about: About) -> R
     let mut info = Info {
         path: contents.path().to_owned(),
         bytes: contents.file_bytes(),
-        is_closed: false,
-        closed_because: None,
         library: contents.header().map(|header| header.library.as_str().into()).unwrap_or_default(),
         profile: contents.header().map(|header| header.profile.as_str().into()).unwrap_or_default(),
-        damages: Vec::new(),
-        damage_count: 0,
-        chunks: 0,
-        messages: 0,
-        repeated: 0,
-        lost: 0,
-        begins_ns: None,
-        losses: Losses::default(),
-        first_ns: None,
-        last_ns: None,
-        channels: Vec::new(),
-        epochs: Vec::new(),
-        session: BTreeMap::new(),
-        configuration: BTreeMap::new(),
-        earlier_configuration: BTreeSet::new(),
-        marks: Vec::new(),
         attachments: about.attachments.into_iter().map(AttachmentInfo::of).collect(),
-        described: Vec::new(),
-        others: Vec::new(),
+        ..Info::default()
     };
     let About { lost, losses, .. } = about;
     let mut memory = about.memory.and(definitions.memory()).map_err(|limit| contents.too_much(limit))?;

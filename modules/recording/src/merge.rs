@@ -61,7 +61,7 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
     // Channels of others may have one topic and different types.
     let types = if new.keeps_theirs() { BTreeMap::new() } else { check_types(paths)? };
     let names = paths.iter().enumerate().map(|(at, path)| (format!("{:04}", at + 1), file_name(path)));
-    new.metadata(metadata::MERGED, &names.collect()).map_err(RewriteError::from)?;
+    new.metadata(metadata::MERGED, &names.collect())?;
     let sources = paths.iter().enumerate().map(|(number, path)| Source::open(number, path, &mut new));
     let mut sources = sources.collect::<Result<Vec<_>, _>>()?;
     let mut written = Written::default();
@@ -74,7 +74,7 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
     let mut losses: [BTreeMap<String, u64>; 2] = Default::default();
     for source in sources {
         for (id, channel) in source.contents.definitions().channels() {
-            new.channel(source.number, id, &unified(channel, &types)).map_err(RewriteError::from)?;
+            new.channel(source.number, id, &unified(channel, &types))?;
         }
         for (all, of_source) in losses.iter_mut().zip([source.lost, source.lost_by]) {
             for (key, count) in of_source {
@@ -86,7 +86,7 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
     for (name, all) in [metadata::LOST, metadata::LOST_BY].into_iter().zip(losses) {
         if !all.is_empty() {
             let texts = all.into_iter().map(|(key, count)| (key, count.to_string()));
-            new.metadata(name, &texts.collect()).map_err(RewriteError::from)?;
+            new.metadata(name, &texts.collect())?;
         }
     }
     let messages = new.messages();
@@ -149,7 +149,7 @@ impl Source {
         if !new.has_channel(self.number, header.channel_id) {
             new.channel(self.number, header.channel_id, &unified(channel, types))?;
         }
-        Ok(new.message(self.number, channel, header, self.contents.data(&found))?)
+        new.message(self.number, channel, header, self.contents.data(&found))
     }
 
     /// Reads on to the next message.
@@ -162,9 +162,7 @@ impl Source {
                 }
                 Item::Damaged(at, what) => return Err(self.contents.damaged(at, what).into()),
                 Item::Metadata(its) if self.contents.heeds(&its) => self.tell(its, new)?,
-                Item::Metadata(its) if new.keeps_theirs() => {
-                    new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?;
-                }
+                Item::Metadata(its) if new.keeps_theirs() => new.metadata(&its.name, &its.metadata)?,
                 Item::Metadata(_) => {}
                 Item::Attachment(attachment) => {
                     let at = attachment.index.offset;

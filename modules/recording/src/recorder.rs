@@ -126,7 +126,7 @@ impl Recorder {
             return self.write_held(now);
         }
         match self.keep_free(0).and_then(|()| self.opened(now)) {
-            Ok(()) => self.shared.counts().problem = None,
+            Ok(()) => self.shared.counts().told.problem = None,
             Err(error) => drop(self.fail(error, now)),
         }
     }
@@ -156,9 +156,9 @@ impl Recorder {
         batch.messages().for_each(|(at, _)| self.channels[at].count_written());
         self.newest.note(&batch, &self.channels);
         let mut counts = self.shared.counts();
-        counts.written += batch.len() as u64;
+        counts.told.written += batch.len() as u64;
         counts.held = 0;
-        counts.problem = None;
+        counts.told.problem = None;
         drop(counts);
         self.shared.inbox.give_back(batch);
     }
@@ -203,7 +203,7 @@ impl Recorder {
             current.tell_lost(&self.channels)?;
             current.sync(&mut *self.disk, now)?;
             let mut counts = self.shared.counts();
-            counts.synced = counts.written - counts.unsure;
+            counts.told.synced = counts.told.written - counts.told.unsure;
         }
         if current.has_content() && self.options.rotation.is_due(0, 0, now.duration_since(current.opened)) {
             self.close("rotated")?;
@@ -242,7 +242,7 @@ impl Recorder {
 
     /// Says in a new file what each says first.
     fn begin(&mut self, file: OpenFile, now: Instant) -> Result<(), DiskError> {
-        self.shared.counts().file = Some(file.path().to_owned());
+        self.shared.counts().told.file = Some(file.path().to_owned());
         let current = self.current.insert(Current::new(file, &self.options, self.lost_told.clone(), now));
         let number = self.number;
         self.number += 1;
@@ -287,11 +287,11 @@ impl Recorder {
         self.lost_told = current.lost_told().to_vec();
         self.current = None;
         let mut counts = self.shared.counts();
-        counts.file = None;
-        counts.files_closed += 1;
+        counts.told.file = None;
+        counts.told.files_closed += 1;
         counts.bytes_before += bytes;
         counts.bytes_now = 0;
-        counts.synced = counts.written - counts.unsure;
+        counts.told.synced = counts.told.written - counts.told.unsure;
         Ok(())
     }
 
@@ -329,12 +329,12 @@ impl Recorder {
         };
         let bytes = file.abandon();
         let mut counts = self.shared.counts();
-        counts.file = None;
-        counts.files_torn += 1;
+        counts.told.file = None;
+        counts.told.files_torn += 1;
         counts.bytes_before += bytes;
         counts.bytes_now = 0;
-        counts.unsure += unsure;
-        counts.synced = counts.written - counts.unsure;
+        counts.told.unsure += unsure;
+        counts.told.synced = counts.told.written - counts.told.unsure;
     }
 
     /// A file without messages is of no use to anybody.
@@ -344,7 +344,7 @@ impl Recorder {
         // If it cannot be removed either, it stays: empty, and readable by `recover`.
         let _ = self.disk.remove(&path);
         let mut counts = self.shared.counts();
-        counts.file = None;
+        counts.told.file = None;
         counts.bytes_now = 0;
     }
 

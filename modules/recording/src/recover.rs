@@ -85,12 +85,10 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
         match item {
             Item::Message(found) => {
                 unchecked += u64::from(found.is_unchecked);
-                new.message(0, &found.channel, &found.header, contents.data(&found)).map_err(RewriteError::from)?;
+                new.message(0, &found.channel, &found.header, contents.data(&found))?;
             }
             Item::Metadata(metadata) if !contents.heeds(&metadata) && !new.keeps_theirs() => {}
-            Item::Metadata(metadata) => {
-                new.metadata(&metadata.name, &metadata.metadata).map_err(RewriteError::from)?;
-            }
+            Item::Metadata(metadata) => new.metadata(&metadata.name, &metadata.metadata)?,
             Item::Attachment(attachment) => {
                 let at = attachment.index.offset;
                 if let Err(damage) = new.attachment::<RecoverError>(path, attachment)? {
@@ -101,7 +99,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
         }
     }
     for (id, channel) in contents.definitions().channels() {
-        new.channel(0, id, channel).map_err(RewriteError::from)?;
+        new.channel(0, id, channel)?;
     }
     let (bytes_before, bytes_read) = (contents.file_bytes(), contents.at());
     let was_closed = contents.ending() == Some(Ending::Closed);
@@ -115,7 +113,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
         ("unchecked", unchecked.to_string()),
     ];
     let about: BTreeMap<String, String> = about.into_iter().map(|(key, text)| (key.to_owned(), text)).collect();
-    new.metadata(metadata::RECOVERED, &about).map_err(RewriteError::from)?;
+    new.metadata(metadata::RECOVERED, &about)?;
     let messages = new.messages();
     let bytes = new.finish()?;
     Ok(Recovered {

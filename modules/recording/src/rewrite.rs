@@ -1,7 +1,7 @@
 //! A new file from what others have. It gets its name once it is whole.
 
 use crate::disk::{Disk, RealDisk, mode_of};
-use crate::error::{Damage, DiskError, ReadError, RewriteError};
+use crate::error::{Damage, ReadError, RewriteError};
 use crate::format::{CHUNK_BYTES_MAX, MESSAGE_OVERHEAD_BYTES, is_of_others, key};
 use crate::part_file::PartFile;
 use crate::read::attachment::Attachment;
@@ -17,10 +17,8 @@ pub type Progress<'a> = dyn FnMut(u64, u64) + 'a;
 
 /// A file in the making. Dropped before its end, it leaves nothing.
 pub(crate) struct Rewriter {
-    /// None once it is closed.
-    file: Option<OpenFile>,
-    /// None once it has its name.
-    part: Option<PartFile>,
+    file: OpenFile,
+    part: PartFile,
     /// Channels by source and number there.
     channels: BTreeMap<(usize, u16), u16>,
     chunk_bytes: usize,
@@ -39,14 +37,8 @@ impl Rewriter {
         let mode = mode_of(sources);
         let (part, made) = PartFile::create(to, |path| RealDisk.create(path, mode))?;
         let file = OpenFile::begin(&mut RealDisk, part.path(), made, header)?;
-        Ok(Self {
-            file: Some(file),
-            part: Some(part),
-            channels: BTreeMap::new(),
-            chunk_bytes: 0,
-            messages: 0,
-            keeps_theirs: is_of_others(header),
-        })
+        let keeps_theirs = is_of_others(header);
+        Ok(Self { file, part, channels: BTreeMap::new(), chunk_bytes: 0, messages: 0, keeps_theirs })
     }
 
     /// Whether it is of another program, as what it is made of: all that one wrote goes on meaning what it means there.
@@ -59,10 +51,9 @@ impl Rewriter {
         self.messages
     }
 
-    pub(crate) fn metadata(&mut self, name: &str, texts: &BTreeMap<String, String>) -> Result<(), DiskError> {
-        let Some(file) = &mut self.file else { return Ok(()) };
+    pub(crate) fn metadata(&mut self, name: &str, texts: &BTreeMap<String, String>) -> Result<(), RewriteError> {
         self.chunk_bytes = 0;
-        file.metadata(name, texts)
+        Ok(self.file.metadata(name, texts)?)
     }
 
     /// Copies an attachment of this file, if it is whole.
@@ -71,15 +62,14 @@ impl Rewriter {
         path: &Path,
         attachment: Attachment,
     ) -> Result<Result<(), Damage>, E> {
-        let Some(file) = &mut self.file else { return Ok(Ok(())) };
         let mut parts = match attachment.open(path)? {
             Ok(parts) => parts,
             Err(damage) => return Ok(Err(damage)),
         };
         self.chunk_bytes = 0;
-        file.begin_attachment(parts.index.clone(), parts.bytes()).map_err(RewriteError::from)?;
+        self.file.begin_attachment(parts.index.clone(), parts.bytes()).map_err(RewriteError::from)?;
         while let Some(part) = parts.next()? {
-            file.attachment_part(part).map_err(RewriteError::from)?;
+            self.file.attachment_part(part).map_err(RewriteError::from)?;
         }
         Ok(Ok(()))
     }
@@ -90,15 +80,14 @@ impl Rewriter {
     }
 
     /// Describes a channel, also if no message of it comes.
-    pub(crate) fn channel(&mut self, source: usize, id: u16, channel: &Arc<Definition>) -> Result<u16, DiskError> {
+    pub(crate) fn channel(&mut self, source: usize, id: u16, channel: &Arc<Definition>) -> Result<u16, RewriteError> {
         if let Some(known) = self.channels.get(&(source, id)) {
             return Ok(*known);
         }
-        let Some(file) = &mut self.file else { return Ok(id) };
         let Definition { topic, message_encoding, texts, unheeded, schema } = &**channel;
         let schema = match schema.encoding.as_str() {
             "" => 0,
-            encoding => file.schema(&schema.name, encoding, &schema.data)?,
+            encoding => self.file.schema(&schema.name, encoding, &schema.data)?,
         };
         let new = if self.keeps_theirs {
             let ours = texts.iter().map(|(key, text)| match key.as_str() {
@@ -106,9 +95,9 @@ impl Rewriter {
                 _ => (key.clone(), text.clone()),
             });
             let texts = ours.chain(unheeded.clone()).collect();
-            file.channel(schema, topic, message_encoding, &texts)?
+            self.file.channel(schema, topic, message_encoding, &texts)?
         } else {
-            file.channel(schema, topic, message_encoding, texts)?
+            self.file.channel(schema, topic, message_encoding, texts)?
         };
         self.channels.insert((source, id), new);
         Ok(new)
@@ -120,15 +109,14 @@ impl Rewriter {
         channel: &Arc<Definition>,
         header: &MessageHeader,
         data: &[u8],
-    ) -> Result<(), DiskError> {
+    ) -> Result<(), RewriteError> {
         let channel_id = self.channel(source, header.channel_id, channel)?;
-        let Some(file) = &mut self.file else { return Ok(()) };
         let more = data.len() + MESSAGE_OVERHEAD_BYTES;
         if self.chunk_bytes > 0 && self.chunk_bytes + more > CHUNK_BYTES_MAX {
-            file.end_chunk()?;
+            self.file.end_chunk()?;
             self.chunk_bytes = 0;
         }
-        file.message(&MessageHeader { channel_id, ..*header }, data)?;
+        self.file.message(&MessageHeader { channel_id, ..*header }, data)?;
         self.chunk_bytes += more;
         self.messages += u64::from(!channel.is_repeated());
         Ok(())
@@ -136,18 +124,8 @@ impl Rewriter {
 
     /// Closes it and gives it its name. Its length.
     pub(crate) fn finish(mut self) -> Result<u64, RewriteError> {
-        let Some(file) = &mut self.file else { return Ok(0) };
-        let bytes = file.close(&mut RealDisk)?;
-        self.part.take().map_or(Ok(()), PartFile::finish)?;
-        self.file = None;
+        let bytes = self.file.close(&mut RealDisk)?;
+        self.part.finish()?;
         Ok(bytes)
-    }
-}
-
-impl Drop for Rewriter {
-    fn drop(&mut self) {
-        if let Some(file) = self.file.take() {
-            file.abandon();
-        }
     }
 }

@@ -64,7 +64,7 @@ impl Shared {
 
     /// Why there is no room for what comes.
     pub(crate) fn why_full(&self) -> LossCause {
-        if self.counts().problem.is_some() {
+        if self.counts().told.problem.is_some() {
             return LossCause::Disk;
         }
         let pace = self.pace.lock().unwrap_or_else(PoisonError::into_inner);
@@ -75,22 +75,8 @@ impl Shared {
         let channels: Vec<_> = self.channels_from(0).iter().map(|channel| channel.status()).collect();
         let mut losses = Losses::default();
         channels.iter().for_each(|channel| losses += channel.losses);
-        let now = self.counts().clone();
-        Status {
-            file: now.file,
-            files_closed: now.files_closed,
-            files_torn: now.files_torn,
-            bytes: now.bytes_before + now.bytes_now,
-            written: now.written,
-            synced: now.synced,
-            unsure: now.unsure,
-            lost: losses.all(),
-            losses,
-            waiting: self.inbox.waiting() + now.held,
-            problem: now.problem,
-            failures: now.failures,
-            is_running,
-            channels,
-        }
+        let Counts { told, bytes_before, bytes_now, held } = self.counts().clone();
+        let (bytes, waiting) = (bytes_before + bytes_now, self.inbox.waiting() + held);
+        Status { bytes, lost: losses.all(), losses, waiting, is_running, channels, ..told }
     }
 }

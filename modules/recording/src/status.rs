@@ -11,7 +11,7 @@ use std::time::Instant;
 ///
 /// Nothing goes uncounted: while no message comes and none is written, `written + lost + waiting` are all that were to
 /// be recorded.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Status {
     /// The file that is written now.
     pub file: Option<PathBuf>,
@@ -108,27 +108,21 @@ impl Failures {
 /// What the thread counts.
 #[derive(Clone, Default)]
 pub(crate) struct Counts {
-    pub(crate) file: Option<PathBuf>,
-    pub(crate) files_closed: u64,
-    pub(crate) files_torn: u64,
+    /// What is told of it as it is.
+    pub(crate) told: Status,
     /// Of files that are written no more.
     pub(crate) bytes_before: u64,
     /// Of the file that is.
     pub(crate) bytes_now: u64,
-    pub(crate) written: u64,
-    pub(crate) synced: u64,
-    pub(crate) unsure: u64,
     /// Messages that the thread has taken and not written.
     pub(crate) held: u64,
-    pub(crate) problem: Option<Problem>,
-    pub(crate) failures: Failures,
 }
 
 impl Counts {
     pub(crate) fn fail(&mut self, error: DiskError, now: Instant) {
-        self.failures.count(&error);
-        let (since, tries) = self.problem.as_ref().map_or((now, 0), |problem| (problem.since, problem.tries));
-        self.problem = Some(Problem { error, since, tries: tries + 1 });
+        self.told.failures.count(&error);
+        let (since, tries) = self.told.problem.as_ref().map_or((now, 0), |problem| (problem.since, problem.tries));
+        self.told.problem = Some(Problem { error, since, tries: tries + 1 });
     }
 }
 

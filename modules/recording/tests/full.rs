@@ -6,7 +6,7 @@ mod common;
 #[path = "../../../mailbox/tests/common/small_memory.rs"]
 mod small_memory;
 
-use common::{Running, busy_options, channels, in_role, recover_all, session, tell, with_message};
+use common::{Running, busy_options, channels, files, in_role, recover_all, session, tell, with_message};
 use rohrpost_recording::{DiskError, Options, Status, Writer};
 use small_memory::{may_mount, with_small_memory};
 use std::ffi::CString;
@@ -79,12 +79,6 @@ fn until_it_fails(writer: &mut Writer, first: u32) -> u32 {
         }
     }
     number
-}
-
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.sort();
-    files
 }
 
 /// Moves files to another place, as a person does that makes room; not the newest one, which may be written.

@@ -21,7 +21,7 @@ mod schema;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{DiskError, ReadError, RewriteError};
+use crate::error::{ReadError, RewriteError};
 use crate::format::{key, metadata, our_header};
 use crate::read::contents::Found;
 use crate::read::selected::Selected;
@@ -109,14 +109,14 @@ pub fn draw(
     let mut new = Rewriter::create(to, &our_header(), [path])?;
     selected.each_metadata(false, |its| {
         if options.with_original || ![metadata::LOST, metadata::LOST_BY].contains(&its.name.as_str()) {
-            new.metadata(&its.name, &its.metadata).map_err(RewriteError::from)?;
+            new.metadata(&its.name, &its.metadata)?;
         }
         Ok::<_, DrawError>(())
     })?;
-    new.metadata(metadata::DRAWN, &selection.about(path)).map_err(RewriteError::from)?;
+    new.metadata(metadata::DRAWN, &selection.about(path))?;
     while let Some(found) = selected.next()? {
         progress(selected.at(), selected.file_bytes());
-        drawing.message(&found, selected.data(&found), options.with_original, &mut new).map_err(RewriteError::from)?;
+        drawing.message(&found, selected.data(&found), options.with_original, &mut new)?;
     }
     let messages = new.messages();
     Ok(Drawn { bytes: new.finish()?, messages, ..drawing.told })
@@ -152,7 +152,7 @@ impl Drawing {
         data: &[u8],
         with_original: bool,
         new: &mut Rewriter,
-    ) -> Result<(), DiskError> {
+    ) -> Result<(), RewriteError> {
         let Found { channel, header, .. } = found;
         if with_original && !channel.texts.contains_key(key::DRAWN) {
             new.message(COPIED, channel, header, data)?;

@@ -10,6 +10,7 @@ use mcap::records::{AttachmentIndex, ChunkIndex, MessageIndex, MetadataIndex, Re
 const FOOTER_BYTES: usize = 8 + 8 + 4;
 
 /// What a closed file says about itself.
+#[derive(Default)]
 pub(crate) struct Index {
     pub(crate) definitions: Definitions,
     /// These are in the order of the file, each once.
@@ -92,7 +93,7 @@ impl Index {
         if frames.step()? == Step::Record(op::HEADER)
             && let Ok(Record::Header(header)) = mcap::parse_record(op::HEADER, frames.body())
         {
-            read.definitions.know(&header);
+            read.index.definitions.know(&header);
         }
         let from = if footer.summary_start == 0 { footer_at } else { footer.summary_start };
         let told = read.summary(frames, from, footer_at)?;
@@ -102,12 +103,11 @@ impl Index {
             (Some(damage), _) => Err(damaged(frames, damage)),
             (None, false) => Err(damaged(frames, Damage::SummarySum)),
             (None, true) => {
-                let Reading { definitions, mut chunks, mut metadata, mut attachments, statistics, .. } = read;
-                sort_places(&mut chunks, |its| its.chunk_start_offset);
-                sort_places(&mut metadata, |its| its.offset);
-                sort_places(&mut attachments, |its| its.offset);
-                let is_checked = footer.summary_crc != 0;
-                Ok(Self { definitions, chunks, metadata, attachments, statistics, is_checked, footer_at })
+                let Reading { mut index, .. } = read;
+                sort_places(&mut index.chunks, |its| its.chunk_start_offset);
+                sort_places(&mut index.metadata, |its| its.offset);
+                sort_places(&mut index.attachments, |its| its.offset);
+                Ok(Self { is_checked: footer.summary_crc != 0, footer_at, ..index })
             }
         }
     }
@@ -116,11 +116,7 @@ impl Index {
 /// What is read so far.
 #[derive(Default)]
 struct Reading {
-    definitions: Definitions,
-    chunks: Vec<ChunkIndex>,
-    metadata: Vec<MetadataIndex>,
-    attachments: Vec<AttachmentIndex>,
-    statistics: Option<Statistics>,
+    index: Index,
     sum: crc32fast::Hasher,
 }
 
@@ -147,7 +143,7 @@ impl Reading {
 
     fn record(&mut self, op: u8, body: &[u8]) -> Result<(), Untaken> {
         match op {
-            op::SCHEMA | op::CHANNEL => match self.definitions.add(op, body) {
+            op::SCHEMA | op::CHANNEL => match self.index.definitions.add(op, body) {
                 // Others may describe channels here again and schemas not.
                 Err(Untaken::Damaged(Damage::UnknownSchema(_))) => return Ok(()),
                 told => return told,
@@ -156,10 +152,10 @@ impl Reading {
             _ => return Ok(()),
         }
         match mcap::parse_record(op, body).map_err(|_| Damage::Record { op })? {
-            Record::ChunkIndex(index) => self.chunks.push(index),
-            Record::MetadataIndex(index) => self.metadata.push(index),
-            Record::AttachmentIndex(index) => self.attachments.push(index),
-            Record::Statistics(statistics) => self.statistics = Some(statistics),
+            Record::ChunkIndex(its) => self.index.chunks.push(its),
+            Record::MetadataIndex(its) => self.index.metadata.push(its),
+            Record::AttachmentIndex(its) => self.index.attachments.push(its),
+            Record::Statistics(its) => self.index.statistics = Some(its),
             _ => {}
         }
         Ok(())

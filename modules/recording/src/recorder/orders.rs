@@ -71,7 +71,7 @@ impl Recorder {
         self.number += 1;
         next.follow(self.lost_told.clone());
         let mut counts = self.shared.counts();
-        counts.file = Some(next.file.path().to_owned());
+        counts.told.file = Some(next.file.path().to_owned());
         counts.bytes_now = next.file.bytes();
         drop(counts);
         self.current = Some(next);

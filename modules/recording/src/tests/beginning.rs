@@ -1,13 +1,9 @@
 //! A file begins with the newest message of each channel, and nothing takes that for a second one.
 
-use super::support::{files, memory_folder, noise, options, session};
-use crate::{
-    ChannelId, ChannelSpec, Cue, Message, Options, Player, Reader, Rotation, Selection, Writer, cut, info, merge,
-};
+use super::support::{channel, channel_of, files, memory_folder, noise, options, session, until};
+use crate::{ChannelId, Cue, Message, Options, Player, Reader, Rotation, Selection, Writer, cut, info, merge};
 use rohrpost_schema::{Field, Members, Named, Type};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 const SECOND_NS: u64 = 1_000_000_000;
 /// What is true now, but for the arrival: topic, stamp, epoch, sequence.
@@ -39,9 +35,7 @@ impl Recording {
         let rotation = Rotation { bytes_max: 300_000, ..Rotation::default() };
         let mut writer = Writer::start(Options { rotation, ..options(folder) }, session()).unwrap();
         let items = [("mapper.0", "map", Type::Bytes), ("laser.0", "scan", Type::Bytes), ("output.0", "line", line())];
-        let channels = items.map(|(name, item, ty)| {
-            writer.channel(&ChannelSpec { name, item, ty: &ty, texts: BTreeMap::new() }).unwrap()
-        });
+        let channels = items.map(|(name, item, ty)| channel_of(&mut writer, name, item, &ty));
         Self { writer, channels, arrival_ns: 5 * SECOND_NS, sequence: 0 }
     }
 
@@ -55,9 +49,7 @@ impl Recording {
     }
 
     fn wait_until_written(&self) {
-        while self.writer.status().written < u64::from(self.sequence) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        until("all is written", || self.writer.status().written >= u64::from(self.sequence));
     }
 
     /// A long line, alone in its chunk: the second one begins the next file.
@@ -268,11 +260,8 @@ fn a_recording_begins_with_what_came_before_it_in_another_one_and_since_then() {
 
     // Channels have other numbers there, and one has another type.
     let mut writer = Writer::start_behind(Some(earlier), options(folder.path()), session()).unwrap();
-    let mut channel = |name: &str, item: &str, ty: Type| {
-        writer.channel(&ChannelSpec { name, item, ty: &ty, texts: BTreeMap::new() }).unwrap()
-    };
     let others = [("pilot.0", "goal", Type::Bytes), ("laser.0", "scan", Type::Bytes), ("mapper.0", "map", Type::Text)];
-    let [goal, ..] = others.map(|(name, item, ty)| channel(name, item, ty));
+    let [goal, ..] = others.map(|(name, item, ty)| channel_of(&mut writer, name, item, &ty));
     writer.write(goal, &late(20, b"go")).unwrap();
     let newest = writer.take_newest();
     writer.finish().1.unwrap();
@@ -282,9 +271,7 @@ fn a_recording_begins_with_what_came_before_it_in_another_one_and_since_then() {
 
     // And again, though nothing came of it in between.
     let mut writer = Writer::start_behind(newest, options(folder.path()), session()).unwrap();
-    let [scan, goal] = [("laser.0", "scan"), ("pilot.0", "goal")].map(|(name, item)| {
-        writer.channel(&ChannelSpec { name, item, ty: &Type::Bytes, texts: BTreeMap::new() }).unwrap()
-    });
+    let [scan, goal] = [("laser.0", "scan"), ("pilot.0", "goal")].map(|(name, item)| channel(&mut writer, name, item));
     assert_ne!(scan, goal);
     writer.write(goal, &late(30, b"stop")).unwrap();
     writer.finish().1.unwrap();

@@ -1,7 +1,7 @@
 //! Small files that ask for much: what is kept of them is bounded, and limits are told as limits.
 
 use super::support::memory_folder;
-use crate::format::{DESCRIBED_BYTES_MAX, SCHEMA_ENCODING};
+use crate::format::{DESCRIBED_BYTES_MAX, SCHEMA_ENCODING, op};
 use crate::{FileLimit, ReadError, Reader, RecoverError, info, recover};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
@@ -10,12 +10,6 @@ use std::collections::BTreeMap;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::Arc;
-
-const OP_CHUNK: u8 = 6;
-const OP_MESSAGE: u8 = 5;
-const OP_MESSAGE_INDEX: u8 = 7;
-const OP_SCHEMA: u8 = 3;
-const OP_METADATA: u8 = 12;
 
 /// A compressed file of channels of one type, with these texts and a message each.
 fn write(path: &Path, channels: u16, ty: &Type, texts: &BTreeMap<String, String>) {
@@ -79,7 +73,7 @@ fn metadata_beyond_the_limit_are_refused_as_such() {
         // No name; length of the list; no key; length of its text.
         let fields = [0, 8 + TEXT_BYTES as u32, 0, TEXT_BYTES as u32].map(u32::to_le_bytes).concat();
         let len = (fields.len() + TEXT_BYTES) as u64;
-        file.write_all_at(&[&[OP_METADATA][..], &len.to_le_bytes(), &fields].concat(), at).unwrap();
+        file.write_all_at(&[&[op::METADATA][..], &len.to_le_bytes(), &fields].concat(), at).unwrap();
         at += 9 + len;
         file.set_len(at).unwrap();
     }
@@ -94,12 +88,12 @@ fn record(op: u8, body: &[u8]) -> Vec<u8> {
 
 /// A file of one chunk, with messages of channels that nothing describes.
 fn of_no_channel(path: &Path, channels: &[u16]) {
-    let message = |channel: &u16| record(OP_MESSAGE, &[&channel.to_le_bytes()[..], &[0; 20]].concat());
+    let message = |channel: &u16| record(op::MESSAGE, &[&channel.to_le_bytes()[..], &[0; 20]].concat());
     let messages: Vec<u8> = channels.iter().flat_map(message).collect();
     let len = (messages.len() as u64).to_le_bytes();
     // Times, length, no sum, no compression, length.
     let chunk = [&[0; 16][..], &len, &[0; 8], &len, &messages].concat();
-    std::fs::write(path, [mcap::MAGIC, &record(OP_CHUNK, &chunk)].concat()).unwrap();
+    std::fs::write(path, [mcap::MAGIC, &record(op::CHUNK, &chunk)].concat()).unwrap();
 }
 
 #[test]
@@ -129,7 +123,7 @@ fn nested_records_are_not_read_as_often_as_there_are_bytes() {
         // One byte more than its body says it has: its end is not to be trusted.
         let packed = len - 40 - 1;
         let head =
-            [&[OP_CHUNK][..], &len.to_le_bytes(), &[0; 16], &packed.to_le_bytes(), &1_u32.to_le_bytes(), &[0; 4]];
+            [&[op::CHUNK][..], &len.to_le_bytes(), &[0; 16], &packed.to_le_bytes(), &1_u32.to_le_bytes(), &[0; 4]];
         let mut chunk = [&head.concat()[..], &packed.to_le_bytes()].concat();
         chunk.resize(BYTES as usize, 0);
         bytes.extend(chunk);
@@ -146,8 +140,8 @@ fn records_that_claim_much_do_not_have_the_file_read_as_often() {
     const CLAIMED: u64 = 100 << 20;
     let folder = memory_folder();
     // Of no bytes: its body is forty zeroes.
-    let chunk = [&[OP_CHUNK][..], &CLAIMED.to_le_bytes(), &[0; 40]].concat();
-    let index = [&record(OP_MESSAGE_INDEX, &[0; 6])[..], &[OP_SCHEMA], &CLAIMED.to_le_bytes()].concat();
+    let chunk = [&[op::CHUNK][..], &CLAIMED.to_le_bytes(), &[0; 40]].concat();
+    let index = [&record(op::MESSAGE_INDEX, &[0; 6])[..], &[op::SCHEMA], &CLAIMED.to_le_bytes()].concat();
     for (case, bytes) in [("chunks", chunk), ("schemas", index)] {
         let [path, to] = ["mcap", "new"].map(|kind| folder.path().join(case).with_extension(kind));
         std::fs::write(&path, [mcap::MAGIC, &bytes.repeat(TIMES)].concat()).unwrap();

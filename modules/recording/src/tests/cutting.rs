@@ -1,12 +1,10 @@
 //! A file cut anywhere is recovered to what was before the cut; a part is taken by time and name.
 
-use super::support::{Said, file_of, memory_folder, options, read, said, session};
+use super::support::{Said, cut_off, file_of, memory_folder, options, read, said, session};
 use crate::{
-    ChannelSpec, CutError, LastMessage, Mark, Message, ReadError, Reader, RecoverError, RewriteError, SelectError,
-    Selection, Writer, cut, info, last_message, merge, recover, recovered_path,
+    CutError, LastMessage, Mark, ReadError, Reader, RecoverError, RewriteError, SelectError, Selection, Writer, cut,
+    info, last_message, merge, recover, recovered_path,
 };
-use rohrpost_schema::Type;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -46,17 +44,8 @@ fn a_file_cut_at_any_byte_is_recovered_to_what_was_before() {
 /// A closed file with a chunk for each ten messages, since a mark is behind them.
 fn file_of_chunks(folder: &Path, all: &[Said]) -> PathBuf {
     let mut writer = Writer::start(options(folder), session()).unwrap();
-    let mut channels = BTreeMap::new();
     for said in all.chunks(10) {
-        for Said { topic, arrival_ns, stamp_ns, epoch, sequence, data } in said {
-            let channel = *channels.entry(topic).or_insert_with(|| {
-                let (name, item) = topic.split_once('/').unwrap();
-                writer.channel(&ChannelSpec { name, item, ty: &Type::Bytes, texts: BTreeMap::new() }).unwrap()
-            });
-            let [arrival_ns, stamp_ns, epoch] = [arrival_ns, stamp_ns, epoch].map(|number| *number);
-            let message = Message { arrival_ns, stamp_ns, epoch, sequence: *sequence, data };
-            writer.write(channel, &message).unwrap();
-        }
+        said.iter().for_each(|one| one.write(&mut writer));
         writer.mark(Mark { time_ns: 1, epoch: 1, text: "ten".into() }).unwrap().wait(PATIENCE).unwrap().unwrap();
     }
     writer.finish().1.unwrap();
@@ -222,8 +211,7 @@ fn a_part_that_cannot_be_is_explained() {
     let selection = Selection { from_ns: Some(5), until_ns: Some(5), ..Selection::default() };
     let error = cut(&path, &to, &selection, &mut |_, _| {}).unwrap_err();
     assert!(matches!(error, CutError::Select(SelectError::NoTime { from_ns: 5, until_ns: 5 })), "{error}");
-    let bytes = std::fs::read(&path).unwrap();
-    std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+    cut_off(&path, 1);
     let error = cut(&path, &to, &Selection::default(), &mut |_, _| {}).unwrap_err();
     assert!(matches!(&error, CutError::Select(SelectError::Read(ReadError::NotClosed { .. }))), "{error}");
     assert!(!to.exists());

@@ -1,13 +1,106 @@
-//! A disk that fails when it is told to.
+//! A disk that does what a test says of each step with it.
 
 use crate::disk::{Disk, DiskFile, RealDisk};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
-/// Of a thousand operations of a kind, how many fail.
+/// What a disk is asked for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum DiskStep {
+    Create,
+    Free,
+    SyncFolder,
+    Remove,
+    /// So many bytes.
+    Write(usize),
+    Sync,
+    Truncate,
+}
+
+/// An error, and how many bytes of a write are done before it.
+pub(super) type StepError = (io::Error, usize);
+
+type Rule = dyn Fn(DiskStep, &Path) -> Result<(), StepError> + Send + Sync;
+
+/// Real files, behind what a test says of each step.
+#[derive(Clone)]
+pub(super) struct TestDisk {
+    rule: Arc<Rule>,
+    pub(super) free_bytes: Arc<AtomicU64>,
+}
+
+struct TestFile {
+    file: Box<dyn DiskFile>,
+    path: PathBuf,
+    disk: TestDisk,
+}
+
+impl TestDisk {
+    pub(super) fn new(rule: impl Fn(DiskStep, &Path) -> Result<(), StepError> + Send + Sync + 'static) -> Self {
+        Self { rule: Arc::new(rule), free_bytes: Arc::new(AtomicU64::new(u64::MAX)) }
+    }
+
+    fn ask(&self, step: DiskStep, path: &Path) -> io::Result<()> {
+        (self.rule)(step, path).map_err(|(error, _)| error)
+    }
+}
+
+impl Disk for TestDisk {
+    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
+        self.ask(DiskStep::Create, path)?;
+        let file = RealDisk.create(path, mode)?;
+        Ok(Box::new(TestFile { file, path: path.to_owned(), disk: self.clone() }))
+    }
+
+    fn free_bytes(&mut self, folder: &Path) -> io::Result<u64> {
+        self.ask(DiskStep::Free, folder)?;
+        Ok(self.free_bytes.load(Relaxed))
+    }
+
+    fn sync_folder(&mut self, folder: &Path) -> io::Result<()> {
+        self.ask(DiskStep::SyncFolder, folder)?;
+        RealDisk.sync_folder(folder)
+    }
+
+    fn remove(&mut self, path: &Path) -> io::Result<()> {
+        self.ask(DiskStep::Remove, path)?;
+        RealDisk.remove(path)
+    }
+}
+
+impl DiskFile for TestFile {
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match (self.disk.rule)(DiskStep::Write(bytes.len()), &self.path) {
+            Ok(()) => self.file.write_all(bytes),
+            Err((error, done)) => self.file.write_all(&bytes[..done]).and(Err(error)),
+        }
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.disk.ask(DiskStep::Sync, &self.path)?;
+        self.file.sync()
+    }
+
+    fn truncate(&mut self, len: u64) -> io::Result<()> {
+        self.disk.ask(DiskStep::Truncate, &self.path)?;
+        self.file.truncate(len)
+    }
+
+    fn has_name(&mut self) -> io::Result<bool> {
+        self.file.has_name()
+    }
+}
+
+/// The disk does not answer any more.
+pub(super) fn broken() -> io::Error {
+    io::Error::from_raw_os_error(5)
+}
+
+/// Of a thousand steps of a kind, how many fail.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Faults {
     pub(super) create: u32,
@@ -16,86 +109,23 @@ pub(super) struct Faults {
     pub(super) free: u32,
 }
 
-/// Chance, shared by a disk and its files.
-#[derive(Clone)]
-pub(super) struct Chance(Arc<Mutex<ChaCha8Rng>>);
-
-impl Chance {
-    fn fails(&self, of_thousand: u32) -> bool {
-        self.0.lock().unwrap().random_range(0..1000) < of_thousand
-    }
-
-    fn below(&self, most: usize) -> usize {
-        self.0.lock().unwrap().random_range(0..=most)
-    }
-}
-
-/// Real files behind faults.
-pub(super) struct FailingDisk {
-    faults: Faults,
-    chance: Chance,
-}
-
-impl FailingDisk {
-    pub(super) fn new(seed: u64, faults: Faults) -> Self {
-        Self { faults, chance: Chance(Arc::new(Mutex::new(ChaCha8Rng::seed_from_u64(seed)))) }
-    }
-}
-
-struct FailingFile {
-    file: Box<dyn DiskFile>,
-    faults: Faults,
-    chance: Chance,
-}
-
-fn full() -> io::Error {
-    io::Error::from(io::ErrorKind::StorageFull)
-}
-
-impl Disk for FailingDisk {
-    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
-        if self.chance.fails(self.faults.create) {
-            return Err(io::Error::from(io::ErrorKind::ReadOnlyFilesystem));
-        }
-        let file = RealDisk.create(path, mode)?;
-        Ok(Box::new(FailingFile { file, faults: self.faults, chance: self.chance.clone() }))
-    }
-
-    fn free_bytes(&mut self, _: &Path) -> io::Result<u64> {
-        if self.chance.fails(self.faults.free) {
-            return Err(io::Error::from(io::ErrorKind::NotFound));
-        }
-        Ok(u64::MAX)
-    }
-
-    fn sync_folder(&mut self, _: &Path) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn remove(&mut self, path: &Path) -> io::Result<()> {
-        RealDisk.remove(path)
-    }
-}
-
-impl DiskFile for FailingFile {
-    /// A failing write leaves a part of it.
-    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        if !self.chance.fails(self.faults.write) {
-            return self.file.write_all(bytes);
-        }
-        self.file.write_all(&bytes[..self.chance.below(bytes.len())])?;
-        Err(full())
-    }
-
-    fn sync(&mut self) -> io::Result<()> {
-        if self.chance.fails(self.faults.sync) { Err(io::Error::from_raw_os_error(5)) } else { Ok(()) }
-    }
-
-    fn truncate(&mut self, len: u64) -> io::Result<()> {
-        self.file.truncate(len)
-    }
-
-    fn has_name(&mut self) -> io::Result<bool> {
-        self.file.has_name()
+impl Faults {
+    /// A disk with these faults. A failing write leaves a part of it.
+    pub(super) fn disk(self, seed: u64) -> Box<TestDisk> {
+        let chance = Mutex::new(ChaCha8Rng::seed_from_u64(seed));
+        Box::new(TestDisk::new(move |step, _| {
+            let (of_thousand, error, bytes) = match step {
+                DiskStep::Create => (self.create, io::ErrorKind::ReadOnlyFilesystem.into(), 0),
+                DiskStep::Free => (self.free, io::ErrorKind::NotFound.into(), 0),
+                DiskStep::Write(bytes) => (self.write, io::ErrorKind::StorageFull.into(), bytes),
+                DiskStep::Sync => (self.sync, broken(), 0),
+                DiskStep::SyncFolder | DiskStep::Remove | DiskStep::Truncate => return Ok(()),
+            };
+            let mut chance = chance.lock().unwrap();
+            if chance.random_range(0..1000) < of_thousand {
+                return Err((error, chance.random_range(0..=bytes)));
+            }
+            Ok(())
+        }))
     }
 }

@@ -2,13 +2,11 @@
 //!
 //! From that step on nothing reaches the disk any more, as of a process that is killed there.
 
+use super::disks::{DiskStep, TestDisk, broken};
 use super::support::{files, memory_folder, options, read, said, session};
-use crate::disk::{Disk, DiskFile, RealDisk};
-use crate::{ChannelSpec, LossCause, Mark, Message, Options, PendingOrder, Rotation, Status, Writer};
+use crate::{LossCause, Mark, Options, PendingOrder, Rotation, Status, Writer};
 use crate::{info, is_closed, recover, recovered_path};
-use rohrpost_schema::Type;
 use std::collections::BTreeMap;
-use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
@@ -16,65 +14,14 @@ use std::time::Duration;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A disk that takes so many steps more.
-#[derive(Clone)]
-struct DyingDisk(Arc<AtomicI64>);
-
-impl DyingDisk {
-    /// Steps that are left before this one; below zero: it is dead.
-    fn step(&self) -> i64 {
-        self.0.fetch_sub(1, Relaxed) - 1
-    }
-
-    fn lives(&self) -> io::Result<()> {
-        if self.step() >= 0 { Ok(()) } else { Err(io::Error::from_raw_os_error(5)) }
-    }
-}
-
-struct DyingFile(Box<dyn DiskFile>, DyingDisk);
-
-impl Disk for DyingDisk {
-    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
-        self.lives()?;
-        Ok(Box::new(DyingFile(RealDisk.create(path, mode)?, self.clone())))
-    }
-
-    fn free_bytes(&mut self, _: &Path) -> io::Result<u64> {
-        Ok(u64::MAX)
-    }
-
-    fn sync_folder(&mut self, _: &Path) -> io::Result<()> {
-        self.lives()
-    }
-
-    fn remove(&mut self, path: &Path) -> io::Result<()> {
-        self.lives()?;
-        RealDisk.remove(path)
-    }
-}
-
-impl DiskFile for DyingFile {
-    /// The last one is done by half.
-    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        match self.1.step() {
-            0.. => self.0.write_all(bytes),
-            -1 => self.0.write_all(&bytes[..bytes.len() / 2]).and(Err(io::Error::from_raw_os_error(5))),
-            _ => Err(io::Error::from_raw_os_error(5)),
-        }
-    }
-
-    fn sync(&mut self) -> io::Result<()> {
-        self.1.lives()
-    }
-
-    fn truncate(&mut self, len: u64) -> io::Result<()> {
-        self.1.lives()?;
-        self.0.truncate(len)
-    }
-
-    fn has_name(&mut self) -> io::Result<bool> {
-        Ok(true)
-    }
+/// A disk that takes so many steps more; below zero it is dead. The last write is done by half.
+fn dying_disk(steps: &Arc<AtomicI64>) -> TestDisk {
+    let steps = steps.clone();
+    TestDisk::new(move |step, _| match (step, step == DiskStep::Free || steps.fetch_sub(1, Relaxed) > 0) {
+        (_, true) => Ok(()),
+        (DiskStep::Write(bytes), false) if steps.load(Relaxed) == -1 => Err((broken(), bytes / 2)),
+        (_, false) => Err((broken(), 0)),
+    })
 }
 
 /// Such messages do not come to the recorder.
@@ -83,7 +30,7 @@ fn is_lost(number: usize) -> bool {
 }
 
 /// Records, rotates and sets marks; then how it went, and the marks that were told to be set.
-fn record_until_dead(disk: DyingDisk, folder: &Path) -> (Status, Vec<String>) {
+fn record_until_dead(disk: TestDisk, folder: &Path) -> (Status, Vec<String>) {
     let rotation = Rotation { bytes_max: 40_000, ..Rotation::default() };
     let ms = Duration::from_millis(1);
     let options = Options { rotation, flush: ms, sync: ms, retry: ms, ..options(folder) };
@@ -98,14 +45,11 @@ fn record_until_dead(disk: DyingDisk, folder: &Path) -> (Status, Vec<String>) {
     };
     let mut told = Vec::new();
     for (number, one) in said(240, 1_000).iter().enumerate() {
-        let (name, item) = one.topic.split_once('/').unwrap();
-        let spec = ChannelSpec { name, item, ty: &Type::Bytes, texts: BTreeMap::new() };
-        let channel = writer.channel(&spec).unwrap();
-        let (arrival_ns, stamp_ns, epoch, sequence) = (one.arrival_ns, one.stamp_ns, one.epoch, one.sequence);
         if is_lost(number) {
+            let channel = one.channel(&mut writer);
             writer.count_lost(channel, LossCause::Recorder, 1);
         } else {
-            writer.write(channel, &Message { arrival_ns, stamp_ns, epoch, sequence, data: &one.data }).unwrap();
+            one.write(&mut writer);
         }
         if number % 40 == 20 {
             let text = number.to_string();
@@ -141,9 +85,9 @@ fn whatever_step_is_its_last_all_that_was_told_to_be_written_is_there() {
     let mut steps = 0;
     loop {
         let folder = memory_folder();
-        let disk = DyingDisk(Arc::new(AtomicI64::new(steps)));
-        let (status, told) = record_until_dead(disk.clone(), folder.path());
-        let has_died = disk.0.load(Relaxed) < 0;
+        let left = Arc::new(AtomicI64::new(steps));
+        let (status, told) = record_until_dead(dying_disk(&left), folder.path());
+        let has_died = left.load(Relaxed) < 0;
         let (mut kept, mut marks, mut lost) = (Vec::new(), Vec::new(), BTreeMap::new());
         let files = files(folder.path());
         for (at, path) in files.iter().enumerate() {

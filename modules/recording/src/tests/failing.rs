@@ -1,15 +1,9 @@
 //! A disk that fails at any operation: all messages are in exactly one file, or counted as lost; and files say so.
 
 use super::beginning::beginning;
-use super::disks::{FailingDisk, Faults};
-use super::support::{Said, files, memory_folder, options, read, record, said, session};
-use crate::disk::{Disk, DiskFile, RealDisk};
-use crate::{
-    ChannelSpec, DiskError, LossCause, Message, Options, Rotation, WriteError, Writer, info, recover, recovered_path,
-};
-use rohrpost_schema::Type;
-use std::collections::BTreeMap;
-use std::io;
+use super::disks::{Faults, TestDisk};
+use super::support::{Said, channel, files, memory_folder, options, read, record, said, session, until};
+use crate::{DiskError, LossCause, Message, Options, Rotation, WriteError, Writer, info, recover, recovered_path};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -40,7 +34,7 @@ fn each_message_is_in_one_file_or_counted_as_lost() {
         let all = said(2_000, 1_000);
         let rotation = Rotation { bytes_max: 300 << 10, ..Rotation::default() };
         let options = Options { rotation, queue_chunks: 1, retry: Duration::from_millis(1), ..options(folder.path()) };
-        let (status, refused) = record(Box::new(FailingDisk::new(seed, faults)), options, &all);
+        let (status, refused) = record(faults.disk(seed), options, &all);
         let (kept, told) = found(folder.path());
         let replay = format!("seed {seed}, {faults:?}, {status:?}");
         assert_eq!(status.waiting, 0, "{replay}");
@@ -58,45 +52,19 @@ fn each_message_is_in_one_file_or_counted_as_lost() {
     }
 }
 
-/// A disk that tells the free space that it is given.
-struct SmallDisk(Arc<AtomicU64>);
-
-impl Disk for SmallDisk {
-    fn create(&mut self, path: &Path, mode: u32) -> io::Result<Box<dyn DiskFile>> {
-        RealDisk.create(path, mode)
-    }
-
-    fn free_bytes(&mut self, _: &Path) -> io::Result<u64> {
-        Ok(self.0.load(Relaxed))
-    }
-
-    fn sync_folder(&mut self, folder: &Path) -> io::Result<()> {
-        RealDisk.sync_folder(folder)
-    }
-
-    fn remove(&mut self, path: &Path) -> io::Result<()> {
-        RealDisk.remove(path)
-    }
-}
-
-fn until(what: &str, is_so: impl Fn() -> bool) {
-    for _ in 0..60_000 {
-        if is_so() {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    panic!("not within a minute: {what}");
+/// Records to a disk with so much free space, and what sets that.
+fn on_small_disk(free_bytes: u64, options: Options) -> (Writer, Arc<AtomicU64>) {
+    let disk = TestDisk::new(|_, _| Ok(()));
+    let free = disk.free_bytes.clone();
+    free.store(free_bytes, Relaxed);
+    (Writer::start_on(Box::new(disk), options, session()).unwrap(), free)
 }
 
 #[test]
 fn what_is_to_stay_free_stays_free_and_recording_goes_on_when_there_is_room() {
     let folder = memory_folder();
-    let free = Arc::new(AtomicU64::new(1 << 30));
-    let options = Options { leave_bytes: 1 << 20, ..options(folder.path()) };
-    let mut writer = Writer::start_on(Box::new(SmallDisk(free.clone())), options, session()).unwrap();
-    let spec = ChannelSpec { name: "laser.0", item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let (mut writer, free) = on_small_disk(1 << 30, Options { leave_bytes: 1 << 20, ..options(folder.path()) });
+    let channel = channel(&mut writer, "laser.0", "scan");
     let data = [7; 1_000];
     let message = |sequence| Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence, data: &data };
     writer.write(channel, &message(0)).unwrap();
@@ -124,11 +92,9 @@ fn what_is_to_stay_free_stays_free_and_recording_goes_on_when_there_is_room() {
 #[test]
 fn what_finds_no_room_is_blamed_on_the_disk_that_fails_and_poses_find_room_beside_pictures() {
     let folder = memory_folder();
-    let free = Arc::new(AtomicU64::new(0));
     let options = Options { leave_bytes: 1, queue_chunks: 4, ..options(folder.path()) };
-    let mut writer = Writer::start_on(Box::new(SmallDisk(free.clone())), options, session()).unwrap();
-    let spec = |name: &'static str| ChannelSpec { name, item: "item", ty: &Type::Bytes, texts: BTreeMap::new() };
-    let [pictures, poses] = ["camera.0", "mapper.0"].map(|name| writer.channel(&spec(name)).unwrap());
+    let (mut writer, free) = on_small_disk(0, options);
+    let [pictures, poses] = ["camera.0", "mapper.0"].map(|name| channel(&mut writer, name, "item"));
     let (picture, pose) = (vec![7; 230_400], [7; 29]);
     let message = |sequence, data| Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence, data };
     writer.write(poses, &message(0, &pose)).unwrap();
@@ -160,8 +126,7 @@ fn a_removed_folder_is_noticed_and_a_new_one_is_used() {
     until("it is not there", || writer.status().problem.is_some());
     let error = writer.status().problem.unwrap().error;
     assert!(matches!(error, DiskError::Gone { .. }), "{error}");
-    let spec = ChannelSpec { name: "laser.0", item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let channel = channel(&mut writer, "laser.0", "scan");
     let message = |sequence| Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence, data: &[1] };
     writer.write(channel, &message(0)).unwrap();
     std::fs::create_dir(&folder).unwrap();
@@ -182,26 +147,22 @@ fn a_removed_folder_is_noticed_and_a_new_one_is_used() {
 #[test]
 fn what_no_disk_took_is_what_the_next_recording_begins_with() {
     let folder = memory_folder();
-    let free = Arc::new(AtomicU64::new(1 << 30));
-    let low = Options { leave_bytes: 1 << 20, ..options(folder.path()) };
-    let mut writer = Writer::start_on(Box::new(SmallDisk(free.clone())), low, session()).unwrap();
-    let spec = |name: &'static str| ChannelSpec { name, item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec("laser.0")).unwrap();
+    let (mut writer, free) = on_small_disk(1 << 30, Options { leave_bytes: 1 << 20, ..options(folder.path()) });
+    let scans = channel(&mut writer, "laser.0", "scan");
     let message = |sequence: u32| {
         let arrival_ns = 10_000_000_000 * u64::from(sequence);
         Message { arrival_ns, stamp_ns: arrival_ns, epoch: 1, sequence, data: b"scan" }
     };
-    writer.write(channel, &message(1)).unwrap();
+    writer.write(scans, &message(1)).unwrap();
     until("the first is written", || writer.status().written == 1);
     free.store(0, Relaxed);
-    writer.write(channel, &message(2)).unwrap();
+    writer.write(scans, &message(2)).unwrap();
     until("the problem is told", || writer.status().problem.is_some());
     let newest = writer.take_newest();
     let (status, _) = writer.finish();
     assert_eq!((status.written, status.lost), (1, 1));
     let mut writer = Writer::start_behind(newest, options(folder.path()), session()).unwrap();
-    let other = writer.channel(&spec("laser.1")).unwrap();
-    writer.channel(&spec("laser.0")).unwrap();
+    let [other, _] = ["laser.1", "laser.0"].map(|name| channel(&mut writer, name, "scan"));
     writer.write(other, &message(3)).unwrap();
     writer.finish().1.unwrap();
     let numbers: Vec<u32> = beginning(files(folder.path()).last().unwrap()).0.iter().map(|its| its.0.3).collect();

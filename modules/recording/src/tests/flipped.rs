@@ -1,15 +1,12 @@
 //! One bit of a file is wrong, any one: messages of the chunk that it is in are lost, and no others.
 
-use super::support::{Said, memory_folder, options, read, said};
+use super::support::{Said, memory_folder, options, read, said, until};
 use crate::format::op;
 use crate::read::contents::{Contents, Item};
 use crate::read::frames::{Frames, Step};
-use crate::{ChannelSpec, Message, Session, Writer, recover};
-use rohrpost_schema::Type;
-use std::collections::BTreeMap;
+use crate::{Session, Writer, recover};
 use std::ops::Range;
 use std::path::Path;
-use std::time::Duration;
 
 const CHUNKS: usize = 10;
 /// One of each channel.
@@ -26,20 +23,10 @@ fn samples(folder: &Path) -> (Vec<Said>, [Vec<u8>; 2]) {
     let all = said((CHUNKS * IN_CHUNK) as u32, 4);
     let all: Vec<Said> = (0..).zip(all).map(|(number, its)| Said { topic: topic(number), ..its }).collect();
     let mut writer = Writer::start(options(folder), Session::default()).unwrap();
-    let channels: Vec<_> = (0..IN_CHUNK)
-        .map(|number| {
-            let topic = topic(number);
-            let (name, item) = topic.split_once('/').unwrap();
-            let spec = ChannelSpec { name, item, ty: &Type::Bytes, texts: BTreeMap::new() };
-            writer.channel(&spec).unwrap()
-        })
-        .collect();
     for (number, said) in all.iter().enumerate() {
-        let Said { arrival_ns, stamp_ns, epoch, sequence, .. } = *said;
-        let message = Message { arrival_ns, stamp_ns, epoch, sequence, data: &said.data };
-        writer.write(channels[number % IN_CHUNK], &message).unwrap();
-        while number % IN_CHUNK == IN_CHUNK - 1 && writer.status().written <= number as u64 {
-            std::thread::sleep(Duration::from_millis(1));
+        said.write(&mut writer);
+        if number % IN_CHUNK == IN_CHUNK - 1 {
+            until("the chunk is written", || writer.status().written > number as u64);
         }
     }
     let path = folder.join("base-0001.mcap");

@@ -1,9 +1,8 @@
 //! Files are merged by time of arrival.
 
-use super::support::{Said, file_of, memory_folder, options, read, said, session};
-use crate::{ChannelSpec, LossCause, MergeError, Message, Options, Writer, info, merge};
+use super::support::{Said, channel_of, cut_off, file_of, memory_folder, options, read, said, session};
+use crate::{LossCause, MergeError, Message, Options, Writer, info, merge};
 use rohrpost_schema::{Field, Members, Named, Type};
-use std::collections::BTreeMap;
 
 #[test]
 fn messages_of_several_files_come_in_the_order_in_which_they_arrived() {
@@ -41,8 +40,7 @@ fn where_time_steps_back_each_files_order_stays() {
 /// A file of one message, with losses.
 fn file_with(folder: &std::path::Path, stem: &str, ty: &Type, lost: u64) -> std::path::PathBuf {
     let mut writer = Writer::start(Options { stem: stem.into(), ..options(folder) }, session()).unwrap();
-    let spec = ChannelSpec { name: "motor.0", item: "state", ty, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let channel = channel_of(&mut writer, "motor.0", "state", ty);
     writer.write(channel, &Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence: 0, data: &[1] }).unwrap();
     writer.count_lost(channel, LossCause::Recorder, lost);
     writer.finish().1.unwrap();
@@ -74,8 +72,7 @@ fn one_name_with_two_types_is_refused_and_losses_are_summed() {
 fn what_was_not_closed_is_not_merged() {
     let folder = memory_folder();
     let path = file_of(folder.path(), "a", &said(20, 10));
-    let bytes = std::fs::read(&path).unwrap();
-    std::fs::write(&path, &bytes[..bytes.len() - 20]).unwrap();
+    cut_off(&path, 20);
     let to = folder.path().join("merged.mcap");
     let error = merge(&[path], &to, &mut |_, _| {}).unwrap_err();
     assert!(error.to_string().contains("was not closed") && error.to_string().contains("`recover`"), "{error}");

@@ -1,14 +1,12 @@
 //! Marks and other files, asked for while it records: at their place among the messages, and with an answer.
 
-use super::disks::{FailingDisk, Faults};
-use super::support::{files, memory_folder, options, said, session};
+use super::disks::Faults;
+use super::support::{channel, cut_off, files, memory_folder, options, said, session, until};
 use crate::read::contents::{Contents, Item};
 use crate::{
-    ChannelId, ChannelSpec, DiskError, FileChange, Mark, Message, OrderError, PendingOrder, Selection, Session, Writer,
-    cut, info, merge, recover, recovered_path,
+    ChannelId, DiskError, FileChange, Mark, Message, OrderError, PendingOrder, Selection, Session, Writer, cut, info,
+    merge, recover, recovered_path,
 };
-use rohrpost_schema::Type;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -16,8 +14,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 fn started(folder: &Path) -> (Writer, ChannelId) {
     let mut writer = Writer::start(options(folder), session()).unwrap();
-    let spec = ChannelSpec { name: "laser.0", item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let channel = channel(&mut writer, "laser.0", "scan");
     (writer, channel)
 }
 
@@ -75,9 +72,9 @@ fn marks_stand_at_their_place_among_the_messages_and_survive_recover_cut_and_mer
     let marks = vec![mark(3, "door open"), mark(5, "T\u{fc}r zu")];
     assert_eq!(info(&path).unwrap().marks, marks);
 
-    let bytes = std::fs::read(&path).unwrap();
     let torn = folder.path().join("torn.mcap");
-    std::fs::write(&torn, &bytes[..bytes.len() - 20]).unwrap();
+    std::fs::copy(&path, &torn).unwrap();
+    cut_off(&torn, 20);
     assert_eq!(info(&torn).unwrap().marks, marks);
     recover(&torn, &recovered_path(&torn), &mut |_, _| {}).unwrap();
     assert_eq!(content(&recovered_path(&torn)), wanted);
@@ -169,12 +166,9 @@ fn another_folder_helps_while_the_disk_fails() {
     let (gone, there) = (folder.path().join("gone"), folder.path().join("there"));
     std::fs::create_dir(&there).unwrap();
     let mut writer = Writer::start(options(&gone), session()).unwrap();
-    let spec = ChannelSpec { name: "laser.0", item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let channel = channel(&mut writer, "laser.0", "scan");
     write(&mut writer, channel, 0..5);
-    while writer.status().problem.is_none() {
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    until("the problem is told", || writer.status().problem.is_some());
     let marked = writer.mark(mark(5, "kept for later"));
     let moved = done(writer.move_to(there.clone()));
     assert_eq!((moved.closed, moved.file.parent()), (None, Some(&*there)));
@@ -190,18 +184,14 @@ fn orders_behind_the_end_and_too_many_of_them_are_refused() {
     let folder = memory_folder();
     let gone = folder.path().join("gone");
     let mut writer = Writer::start(options(&gone), session()).unwrap();
-    while writer.status().problem.is_none() {
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    until("the problem is told", || writer.status().problem.is_some());
     let mut waiting: Vec<PendingOrder> = (0..16).map(|_| writer.rotate().unwrap()).collect();
     assert!(matches!(writer.rotate(), Err(OrderError::Full)));
     writer.begin_end();
     assert!(matches!(writer.mark(mark(1, "late")), Err(OrderError::Ended)));
     let told: Vec<_> = waiting.drain(..).map(|pending| pending.wait(PATIENCE).unwrap()).collect();
     assert!(told.iter().all(Result::is_err), "{told:?}");
-    while writer.status().is_running {
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    until("it has ended", || !writer.status().is_running);
     assert!(writer.finish().1.is_err());
 }
 
@@ -213,10 +203,8 @@ fn orders_on_a_failing_disk_are_answered_and_no_message_is_lost_uncounted() {
         let folder = memory_folder();
         let all = said(600, 500);
         let options = crate::Options { retry: Duration::from_millis(1), ..options(folder.path()) };
-        let mut writer =
-            Writer::start_on(Box::new(FailingDisk::new(seed, faults)), options, Session::default()).unwrap();
-        let spec = ChannelSpec { name: "laser.0", item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
-        let channel = writer.channel(&spec).unwrap();
+        let mut writer = Writer::start_on(faults.disk(seed), options, Session::default()).unwrap();
+        let channel = channel(&mut writer, "laser.0", "scan");
         let mut orders = Vec::new();
         for (number, one) in all.iter().enumerate() {
             let message = Message { arrival_ns: 1, stamp_ns: 1, epoch: 1, sequence: number as u32, data: &one.data };

@@ -1,6 +1,6 @@
 //! A replay has the recording's order and spacing, whatever the time does.
 
-use super::support::{Said, file_of, files, memory_folder, options, record, said};
+use super::support::{Said, cut_off, file_of, files, memory_folder, options, record, said};
 use crate::disk::RealDisk;
 use crate::{Cue, Options, Player, Reader, Rotation};
 use std::path::{Path, PathBuf};
@@ -120,8 +120,7 @@ fn a_replay_goes_on_at_any_time_of_any_file() {
 fn a_file_without_an_index_is_searched_from_its_beginning() {
     let (folder, all) = (memory_folder(), said(6_000, 700));
     let path = file_of(folder.path(), "a", &all);
-    let bytes = std::fs::read(&path).unwrap();
-    std::fs::write(&path, &bytes[..bytes.len() - 20]).unwrap();
+    cut_off(&path, 20);
     let mut reader = Reader::open(&path).unwrap();
     for number in [5_000, 10] {
         assert!(reader.seek(all[100].arrival_ns).unwrap());

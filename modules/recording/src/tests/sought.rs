@@ -2,7 +2,7 @@
 
 use super::beginning::three_files;
 use super::foreign;
-use super::support::{Said, file_of, memory_folder, noise, options, read, record, said};
+use super::support::{Said, cut_off, file_of, memory_folder, noise, options, read, record, said};
 use crate::disk::RealDisk;
 use crate::read::frames::Frames;
 use crate::read::index::Index;
@@ -10,7 +10,7 @@ use crate::{Cue, Damage, Options, Player, ReadError, Rotation, Selection, cut, m
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Topic and number of a message.
 type Which = (String, u32);
@@ -75,12 +75,6 @@ fn check(files: &[PathBuf], all: &[Said]) {
     }
 }
 
-/// Without its index and end, as of a recorder that was killed.
-fn killed(path: &Path) {
-    let bytes = std::fs::read(path).unwrap();
-    std::fs::write(path, &bytes[..bytes.len() - 20]).unwrap();
-}
-
 #[test]
 fn at_any_time_of_a_recording_each_channel_has_its_newest_message() {
     let folder = memory_folder();
@@ -110,7 +104,7 @@ fn at_any_time_of_a_recording_each_channel_has_its_newest_message() {
     let before: Vec<u32> = (4..24).collect();
     assert_eq!(numbers[..20].iter().map(|(number, _)| *number).collect::<Vec<_>>(), before);
     assert_eq!(numbers[20..], [(30, true)], "the newest of the file that is left out, and none twice");
-    files.iter().for_each(|file| killed(file));
+    files.iter().for_each(|file| cut_off(file, 20));
     check(&files, &all);
 }
 

@@ -2,7 +2,7 @@
 
 use crate::disk::Disk;
 use crate::read::contents::{Contents, Item};
-use crate::{ChannelSpec, Message, Options, Session, Status, Writer};
+use crate::{ChannelId, ChannelSpec, Message, Options, Session, Status, Writer};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,6 +22,34 @@ pub(super) struct Said {
     pub(super) epoch: u64,
     pub(super) sequence: u32,
     pub(super) data: Vec<u8>,
+}
+
+impl Said {
+    pub(super) fn message(&self) -> Message<'_> {
+        let Self { arrival_ns, stamp_ns, epoch, sequence, .. } = *self;
+        Message { arrival_ns, stamp_ns, epoch, sequence, data: &self.data }
+    }
+
+    /// Its channel, which is added if it is not there.
+    pub(super) fn channel(&self, writer: &mut Writer) -> ChannelId {
+        let (name, item) = self.topic.split_once('/').unwrap();
+        channel(writer, name, item)
+    }
+
+    /// Records it.
+    pub(super) fn write(&self, writer: &mut Writer) {
+        let channel = self.channel(writer);
+        writer.write(channel, &self.message()).unwrap();
+    }
+}
+
+/// A channel of bytes.
+pub(super) fn channel(writer: &mut Writer, name: &str, item: &str) -> ChannelId {
+    channel_of(writer, name, item, &Type::Bytes)
+}
+
+pub(super) fn channel_of(writer: &mut Writer, name: &str, item: &str, ty: &Type) -> ChannelId {
+    writer.channel(&ChannelSpec { name, item, ty, texts: BTreeMap::new() }).unwrap()
 }
 
 /// The messages of `count`, of three channels in turn.
@@ -69,21 +97,26 @@ pub(super) fn session() -> Session {
 /// Records, and ends the recording. Those that were not taken.
 pub(super) fn record(disk: Box<dyn Disk>, options: Options, all: &[Said]) -> (Status, Vec<Said>) {
     let mut writer = Writer::start_on(disk, options, session()).unwrap();
-    let mut channels = BTreeMap::new();
     let mut refused = Vec::new();
     for said in all {
-        let channel = *channels.entry(&said.topic).or_insert_with(|| {
-            let (name, item) = said.topic.split_once('/').unwrap();
-            writer.channel(&ChannelSpec { name, item, ty: &Type::Bytes, texts: BTreeMap::new() }).unwrap()
-        });
-        let Said { arrival_ns, stamp_ns, epoch, sequence, .. } = *said;
-        let message = Message { arrival_ns, stamp_ns, epoch, sequence, data: &said.data };
-        if writer.write(channel, &message).is_err() {
+        let channel = said.channel(&mut writer);
+        if writer.write(channel, &said.message()).is_err() {
             refused.push(said.clone());
         }
     }
     let (status, _) = writer.finish();
     (status, refused)
+}
+
+/// Waits until it is so.
+pub(super) fn until(what: &str, is_so: impl Fn() -> bool) {
+    for _ in 0..60_000 {
+        if is_so() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    panic!("not within a minute: {what}");
 }
 
 /// All of a file but what it repeats, and what is wrong with it.
@@ -113,6 +146,12 @@ pub(super) fn files(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     files
+}
+
+/// Cuts so many bytes off a file: without the last twenty it has no end, as if its recorder was killed.
+pub(super) fn cut_off(path: &Path, bytes: u64) {
+    let file = std::fs::File::options().write(true).open(path).unwrap();
+    file.set_len(file.metadata().unwrap().len() - bytes).unwrap();
 }
 
 /// A closed file of these messages.

@@ -1,6 +1,8 @@
 //! What is written is read again, in the order in which it came.
 
-use super::support::{Said, file_of, files, memory_folder, noise, options, read, record, said};
+use super::support::{
+    Said, channel, channel_of, file_of, files, memory_folder, noise, options, read, record, said, until,
+};
 use crate::disk::RealDisk;
 use crate::{
     ChannelError, ChannelSpec, DescribedModule, LossCause, Losses, Message, Options, Rotation, Selection, Session,
@@ -101,8 +103,7 @@ fn files_are_rotated_by_time() {
     let folder = memory_folder();
     let rotation = Rotation { age_max: Duration::from_millis(20), ..Rotation::default() };
     let mut writer = Writer::start(Options { rotation, ..options(folder.path()) }, Session::default()).unwrap();
-    let spec = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let channel = channel_of(&mut writer, "motor.0", "speed", &Type::U8);
     let mut sequence = 0;
     while writer.status().files_closed < 3 {
         writer.write(channel, &message(sequence, &[1])).unwrap();
@@ -137,8 +138,7 @@ fn a_chunk_is_a_megabyte_or_one_message() {
 fn a_message_that_is_too_long_is_lost_and_counted() {
     let folder = memory_folder();
     let mut writer = Writer::start(options(folder.path()), Session::default()).unwrap();
-    let spec = ChannelSpec { name: "camera.0", item: "image", ty: &Type::Bytes, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let channel = channel(&mut writer, "camera.0", "image");
     let long = vec![0; (16 << 20) + 1];
     assert_eq!(writer.write(channel, &message(0, &long)), Err(WriteError::Long(long.len())));
     writer.write(channel, &message(1, &long[1..])).unwrap();
@@ -194,8 +194,7 @@ fn nothing_is_overwritten() {
 fn losses_are_told_also_of_a_channel_without_messages() {
     let folder = memory_folder();
     let mut writer = Writer::start(options(folder.path()), Session::default()).unwrap();
-    let spec = ChannelSpec { name: "camera.0", item: "image", ty: &Type::Bytes, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let channel = channel(&mut writer, "camera.0", "image");
     writer.count_lost(channel, LossCause::Recorder, 7);
     writer.finish().1.unwrap();
     let told = info(&files(folder.path())[0]).unwrap();
@@ -213,8 +212,7 @@ fn modules_are_described_in_each_file_and_in_what_is_made_of_it() {
     let folder = memory_folder();
     let rotation = Rotation { bytes_max: 1 << 20, ..Rotation::default() };
     let mut writer = Writer::start(Options { rotation, ..options(folder.path()) }, Session::default()).unwrap();
-    let spec = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).unwrap();
+    let channel = channel_of(&mut writer, "motor.0", "speed", &Type::U8);
     let modules = ["motor.0", "pump.3"].map(|name| {
         let description = described(&name[..name.len() - 2]);
         writer.describe(name, &description).unwrap();
@@ -226,9 +224,7 @@ fn modules_are_described_in_each_file_and_in_what_is_made_of_it() {
     for sequence in 0..400 {
         writer.write(channel, &message(sequence, &noise(sequence, 10_000))).unwrap();
     }
-    while writer.status().waiting > 0 {
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    until("what waits is written", || writer.status().waiting == 0);
     let late = DescribedModule { name: "late.0".into(), description: described("late") };
     writer.describe("late.0", &late.description).unwrap();
     writer.finish().1.unwrap();

@@ -155,8 +155,7 @@ impl OpenFile {
         records::put(&mut self.scratch, op::METADATA, |body| {
             body.text(name).texts(texts);
         });
-        let told = self.output.put(&self.scratch);
-        self.explained(told)?;
+        self.explained(|its| its.output.put(&its.scratch))?;
         let length = self.scratch.len() as u64;
         self.summary.metadata.push(MetadataIndex { offset, length, name: name.to_owned() });
         Ok(())
@@ -174,8 +173,7 @@ impl OpenFile {
 
     /// Goes on with it.
     pub(crate) fn attachment_part(&mut self, part: &[u8]) -> Result<(), DiskError> {
-        let told = self.output.put(part);
-        self.explained(told)
+        self.explained(|its| its.output.put(part))
     }
 
     /// Describes a type; the same one again has the same number.
@@ -183,8 +181,7 @@ impl OpenFile {
         records::body(&mut self.scratch, |body| {
             body.text(name).text(encoding).bytes(data);
         });
-        let told = self.schemas.number(&self.scratch);
-        let (number, is_new) = self.explained(told)?;
+        let (number, is_new) = self.explained(|its| its.schemas.number(&its.scratch))?;
         if is_new {
             self.describe_schema(number);
         }
@@ -202,8 +199,7 @@ impl OpenFile {
         records::body(&mut self.scratch, |body| {
             body.u16(schema).text(topic).text(encoding).texts(texts);
         });
-        let told = self.channels.number(&self.scratch);
-        let (number, is_new) = self.explained(told)?;
+        let (number, is_new) = self.explained(|its| its.channels.number(&its.scratch))?;
         if is_new {
             self.schema_of.push(schema);
             self.describe_channel(number);
@@ -254,8 +250,7 @@ impl OpenFile {
     /// Begins another chunk in the middle of what belongs together: after an error none of it stays.
     pub(crate) fn split_chunk(&mut self) -> Result<(), DiskError> {
         self.finish_chunk()?;
-        let told = self.output.flush();
-        self.explained(told)
+        self.explained(|its| its.output.flush())
     }
 
     fn finish_chunk(&mut self) -> Result<(), DiskError> {
@@ -263,8 +258,11 @@ impl OpenFile {
             return Ok(());
         }
         let at = self.bytes();
-        let told = self.chunk.take().and_then(|packed| self.output.put(&packed.bytes).map(|()| packed));
-        let packed = self.explained(told)?;
+        let packed = self.explained(|its| {
+            let packed = its.chunk.take()?;
+            its.output.put(&packed.bytes)?;
+            Ok(packed)
+        })?;
         self.summary.chunk(at, &packed);
         self.chunk_number += 1;
         Ok(())
@@ -295,8 +293,7 @@ impl OpenFile {
         let (schemas, channels) = (self.schemas.records(op::SCHEMA), self.channels.records(op::CHANNEL));
         let summary = self.summary.bytes(self.bytes() + end.len() as u64, schemas, channels);
         end.extend_from_slice(&summary);
-        let told = self.output.put(&end).and_then(|()| self.output.flush());
-        self.explained(told)?;
+        self.explained(|its| its.output.put(&end).and_then(|()| its.output.flush()))?;
         self.whole_bytes = self.bytes();
         self.sync(disk)?;
         Ok(self.whole_bytes)
@@ -309,8 +306,9 @@ impl OpenFile {
         if self.output.file().truncate(self.whole_bytes).is_ok() { self.whole_bytes } else { self.output.position() }
     }
 
-    fn explained<T>(&self, told: io::Result<T>) -> Result<T, DiskError> {
-        told.map_err(|error| DiskError::new("write", &self.path, error))
+    /// Does what may fail as writing does.
+    fn explained<T>(&mut self, act: impl FnOnce(&mut Self) -> io::Result<T>) -> Result<T, DiskError> {
+        act(self).map_err(|error| DiskError::new("write", &self.path, error))
     }
 }
 

@@ -16,12 +16,6 @@ pub(super) struct Summary {
     times: Option<(u64, u64)>,
 }
 
-/// Records of one type, as they stand in the summary.
-struct Group {
-    op: u8,
-    records: Vec<u8>,
-}
-
 impl Summary {
     pub(super) fn count(&mut self, header: &MessageHeader) {
         *self.counts.entry(header.channel_id).or_default() += 1;
@@ -59,15 +53,15 @@ impl Summary {
             });
         });
         let groups = [
-            Group { op: op::SCHEMA, records: schemas.records },
-            Group { op: op::CHANNEL, records: channels.records },
-            Group { op: op::STATISTICS, records: statistics },
-            Group { op: op::CHUNK_INDEX, records: self.chunk_records() },
-            Group { op: op::ATTACHMENT_INDEX, records: self.attachment_records() },
-            Group { op: op::METADATA_INDEX, records: self.metadata_records() },
+            (op::SCHEMA, schemas.records),
+            (op::CHANNEL, channels.records),
+            (op::STATISTICS, statistics),
+            (op::CHUNK_INDEX, self.chunk_records()),
+            (op::ATTACHMENT_INDEX, self.attachment_records()),
+            (op::METADATA_INDEX, self.metadata_records()),
         ];
         let (mut all, mut offsets) = (Vec::new(), Vec::new());
-        for Group { op, records } in groups.into_iter().filter(|group| !group.records.is_empty()) {
+        for (op, records) in groups.into_iter().filter(|(_, records)| !records.is_empty()) {
             let group_at = at + all.len() as u64;
             records::put(&mut offsets, op::SUMMARY_OFFSET, |body| {
                 body.u8(op).u64(group_at).u64(records.len() as u64);
@@ -88,43 +82,38 @@ impl Summary {
     }
 
     fn chunk_records(&self) -> Vec<u8> {
-        let mut all = Vec::new();
-        for chunk in &self.chunks {
-            records::put(&mut all, op::CHUNK_INDEX, |body| {
-                body.u64(chunk.message_start_time).u64(chunk.message_end_time);
-                body.u64(chunk.chunk_start_offset).u64(chunk.chunk_length);
-                body.list(|body| {
-                    for (id, at) in &chunk.message_index_offsets {
-                        body.u16(*id).u64(*at);
-                    }
-                });
-                body.u64(chunk.message_index_length).text(&chunk.compression);
-                body.u64(chunk.compressed_size).u64(chunk.uncompressed_size);
+        each(op::CHUNK_INDEX, &self.chunks, |body, chunk| {
+            body.u64(chunk.message_start_time).u64(chunk.message_end_time);
+            body.u64(chunk.chunk_start_offset).u64(chunk.chunk_length);
+            body.list(|body| {
+                for (id, at) in &chunk.message_index_offsets {
+                    body.u16(*id).u64(*at);
+                }
             });
-        }
-        all
+            body.u64(chunk.message_index_length).text(&chunk.compression);
+            body.u64(chunk.compressed_size).u64(chunk.uncompressed_size);
+        })
     }
 
     fn attachment_records(&self) -> Vec<u8> {
-        let mut all = Vec::new();
-        for its in &self.attachments {
-            records::put(&mut all, op::ATTACHMENT_INDEX, |body| {
-                body.u64(its.offset).u64(its.length).u64(its.log_time).u64(its.create_time).u64(its.data_size);
-                body.text(&its.name).text(&its.media_type);
-            });
-        }
-        all
+        each(op::ATTACHMENT_INDEX, &self.attachments, |body, its| {
+            body.u64(its.offset).u64(its.length).u64(its.log_time).u64(its.create_time).u64(its.data_size);
+            body.text(&its.name).text(&its.media_type);
+        })
     }
 
     fn metadata_records(&self) -> Vec<u8> {
-        let mut all = Vec::new();
-        for its in &self.metadata {
-            records::put(&mut all, op::METADATA_INDEX, |body| {
-                body.u64(its.offset).u64(its.length).text(&its.name);
-            });
-        }
-        all
+        each(op::METADATA_INDEX, &self.metadata, |body, its| {
+            body.u64(its.offset).u64(its.length).text(&its.name);
+        })
     }
+}
+
+/// A record for each of these.
+fn each<T>(op: u8, all: &[T], fill: impl Fn(&mut records::Body<'_>, &T)) -> Vec<u8> {
+    let mut out = Vec::new();
+    all.iter().for_each(|its| records::put(&mut out, op, |body| fill(body, its)));
+    out
 }
 
 /// Records of all schemas, or of all channels.

@@ -101,13 +101,18 @@ pub(crate) fn with_message<T>(number: u32, take: impl FnOnce(usize, &Message<'_>
     take(number as usize % 2, &Message { arrival_ns: ns, stamp_ns: ns - 500, epoch, sequence: number, data: &data })
 }
 
-/// Recovers each file of a folder, in their order, and checks that their messages are those from 0 on. How many.
-pub(crate) fn recover_all(folder: &Path) -> (u32, Vec<Recovered>) {
+/// The files of a folder, in their order.
+pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
+    files
+}
+
+/// Recovers each file of a folder, in their order, and checks that their messages are those from 0 on. How many.
+pub(crate) fn recover_all(folder: &Path) -> (u32, Vec<Recovered>) {
     let mut reports = Vec::new();
     let mut next = 0;
-    for path in files {
+    for path in files(folder) {
         let to = recovered_path(&path);
         let report = recover(&path, &to, &mut |_, _| {}).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         next = check_messages(&to, next);
