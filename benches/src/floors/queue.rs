@@ -4,7 +4,7 @@ use nix::mqueue::{MQ_OFlag, MqAttr, MqdT, mq_attr_member_t, mq_close, mq_open, m
 use nix::sched::{CloneFlags, unshare};
 use nix::sys::resource::{RLIM_INFINITY, Resource, setrlimit};
 use nix::sys::stat::Mode;
-use rohrpost_bench_local::harness::{End, Failure, Link};
+use rohrpost_bench_local::harness::{End, Failure, Link, OrFail};
 use std::fs;
 use std::sync::Once;
 
@@ -33,7 +33,7 @@ impl Queue {
             Failure::Skipped(format!("a POSIX queue of {depth} × {bytes} B is refused, which root may have: {error}"))
         };
         let queue = mq_open(name.as_str(), flags, Mode::S_IRUSR | Mode::S_IWUSR, Some(&attributes)).map_err(refused)?;
-        mq_unlink(name.as_str()).map_err(|error| Failure::of("mq_unlink", error))?;
+        mq_unlink(name.as_str()).or_fail("mq_unlink")?;
         Ok(Self { open: Some(queue) })
     }
 
@@ -46,7 +46,7 @@ impl Queue {
     /// # Errors
     /// What the kernel says.
     pub fn send(&self, message: &[u8], priority: u32) -> Result<(), Failure> {
-        mq_send(self.open()?, message, priority).map_err(|error| Failure::of("mq_send", error))
+        mq_send(self.open()?, message, priority).or_fail("mq_send")
     }
 
     /// Receives the most important message, of exactly this length; sleeps until there is one. Gives its priority.

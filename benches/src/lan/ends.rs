@@ -2,7 +2,7 @@
 
 use super::flow::{Inlet, LOOK, Outlet};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, Link, Meetings};
+use rohrpost_bench_local::harness::{Child, Link, Meetings, OrFail};
 use rohrpost_mailbox::{
     Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
@@ -39,9 +39,9 @@ impl Module {
     ) -> Result<Self, Failure> {
         let participant = join(directory, own)?;
         let shape = Shape { body_bytes_max: body(bytes)?, ..Shape::default() };
-        let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
+        let receiver = participant.receiver(own, shape).or_fail("mailbox")?;
         meetings.meet()?;
-        let sender = participant.sender(other).map_err(|error| Failure::of("way to the other node", error))?;
+        let sender = participant.sender(other).or_fail("way to the other node")?;
         let label = Label { from: own, kind: Type::data(0), priority: Priority(own.class().0), ..Label::default() };
         Ok(Self { receiver, sender, label, patience: None })
     }
@@ -55,7 +55,7 @@ impl Module {
 
 impl Link for Module {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.sender.send(&self.label, &[message]).map_err(|error| Failure::of("send", error))
+        self.sender.send(&self.label, &[message]).or_fail("send")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
@@ -82,7 +82,7 @@ pub fn await_way([from, to]: [&Path; 2], [own, other]: [Name; 2]) -> Result<(), 
         }
         Ok(())
     })?;
-    sends.finish(Instant::now() + COMES_WITHIN).map_err(|failure| Failure::of("no package comes", failure))
+    sends.finish(Instant::now() + COMES_WITHIN).or_fail("no package comes")
 }
 
 /// The sending side of a stream of packages.
@@ -98,7 +98,7 @@ impl LanSource {
     /// When there is no route to the other node.
     pub fn open(directory: &Path, own: Name, to: Name) -> Result<Self, Failure> {
         let participant = join(directory, own)?;
-        let sender = participant.sender(to).map_err(|error| Failure::of("way to the other node", error))?;
+        let sender = participant.sender(to).or_fail("way to the other node")?;
         let label = Label { from: own, kind: Type::data(0), priority: Priority(own.class().0), ..Label::default() };
         Ok(Self { sender, label })
     }
@@ -145,7 +145,7 @@ impl LanSink {
         let participant = join(directory, own)?;
         let shape =
             Shape { slots: SLOTS, body_bytes_max: body(bytes)?, full: OverflowPolicy::Reject, ..Shape::default() };
-        let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
+        let receiver = participant.receiver(own, shape).or_fail("mailbox")?;
         Ok(Self { receiver })
     }
 
@@ -171,13 +171,13 @@ impl Outlet for LanSink {
 }
 
 fn join(directory: &Path, own: Name) -> Result<Arc<Participant>, Failure> {
-    let node = Node::open(directory).map_err(|error| Failure::of("node", error))?;
+    let node = Node::open(directory).or_fail("node")?;
     let module = Name::new(own.system(), own.class().0, own.instance(), 0);
-    Participant::join(&node, module).map_err(|error| Failure::of("node", error))
+    Participant::join(&node, module).or_fail("node")
 }
 
 fn body(bytes: usize) -> Result<u16, Failure> {
-    u16::try_from(bytes).map_err(|error| Failure::of("size", error))
+    u16::try_from(bytes).or_fail("size")
 }
 
 fn copy(body: &[u8], message: &mut [u8]) -> Result<(), Failure> {

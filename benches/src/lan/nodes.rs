@@ -5,7 +5,7 @@ use super::records::{self, RECORDS};
 use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all};
 use super::wire::{Wire, address, name_of};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{End, Meetings, Placement, Scheduling, Scratch, settle};
+use rohrpost_bench_local::harness::{End, Meetings, OrFail, Placement, Scheduling, Scratch, settle};
 use rohrpost_mailbox::{Class, Name, StreamShape};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -33,8 +33,11 @@ pub struct Network {
     pub records: Option<StreamShape>,
 }
 
-/// More than the computer can do, so that it is not in the way.
-pub const UNPACED: &str = "64 GiB";
+/// Of a current Ethernet.
+pub const ETHERNET: u16 = 1_500;
+
+/// An Ethernet with routers that may send more than the computer can do, so that this is not in the way.
+pub const UNPACED: Network = Network { mtu: ETHERNET, rate: "64 GiB", quota: "1 MiB", sealed: false, records: None };
 
 /// Two nodes, until this is dropped.
 pub struct Nodes {
@@ -52,7 +55,7 @@ impl Nodes {
         let mut nodes = Self { scratch: Scratch::new()?, routers: Vec::new() };
         let config = nodes.scratch.directory().join("bench-lan.toml");
         let text = configuration(network);
-        fs::write(&config, text).map_err(|error| Failure::of("configuration", error))?;
+        fs::write(&config, text).or_fail("configuration")?;
         if network.sealed {
             make_keys(&command, &nodes.scratch.directory().join("keys"))?;
         }
@@ -99,8 +102,7 @@ impl Drop for Nodes {
 }
 
 fn make_keys(command: &Path, folder: &Path) -> Result<(), Failure> {
-    let made = Command::new(command).args(["keys", "new"]).arg(folder).output();
-    let made = made.map_err(|error| Failure::of("rohrpost keys", error))?;
+    let made = Command::new(command).args(["keys", "new"]).arg(folder).output().or_fail("rohrpost keys")?;
     let said = || String::from_utf8_lossy(&made.stderr).into_owned();
     if made.status.success() { Ok(()) } else { Err(Failure::Failed(format!("rohrpost keys new: {}", said()))) }
 }

@@ -8,7 +8,7 @@
 use super::flow::{Inlet, LOOK, Outlet, SILENCE, look_at};
 use super::router::SYSTEM;
 use crate::streams::{came, stamp, stream_failure};
-use rohrpost_bench_local::harness::{Child, Failure, Link};
+use rohrpost_bench_local::harness::{Child, Failure, Link, OrFail};
 use rohrpost_mailbox::{
     Class, Name, Next, Node, Participant, Shape, StreamId, StreamReader, StreamShape, StreamWriter, Waiting,
 };
@@ -52,10 +52,9 @@ pub fn entries(instance: u8, node: &str, to: &[&str], shape: StreamShape) -> Str
 pub fn begin(from: &Path, to: &Path, instance: u8, shape: StreamShape) -> Result<(), Failure> {
     let begun = Child::start(|| {
         let participant = join(from)?;
-        let module = participant.receiver(stream(instance).name, Shape::default());
-        let module = module.map_err(|error| Failure::of("mailbox", error))?;
+        let module = participant.receiver(stream(instance).name, Shape::default()).or_fail("mailbox")?;
         // It stays when its mailbox has no owner any more.
-        module.set_about(&description().to_bytes()).map_err(|error| Failure::of("description", error))?;
+        module.set_about(&description().to_bytes()).or_fail("description")?;
         let (mut inlet, mut outlet) = (RecordInlet::open(from, instance, shape)?, RecordOutlet::open(to, instance)?);
         loop {
             inlet.send(&[])?;
@@ -65,7 +64,7 @@ pub fn begin(from: &Path, to: &Path, instance: u8, shape: StreamShape) -> Result
             std::thread::sleep(WRITE_EACH);
         }
     })?;
-    begun.finish(Instant::now() + BEGINS_WITHIN).map_err(|failure| Failure::of("a replica does not begin", failure))
+    begun.finish(Instant::now() + BEGINS_WITHIN).or_fail("a replica does not begin")
 }
 
 fn description() -> Description {
@@ -76,8 +75,8 @@ fn description() -> Description {
 }
 
 fn join(directory: &Path) -> Result<Arc<Participant>, Failure> {
-    let node = Node::open(directory).map_err(|error| Failure::of("node", error))?;
-    Participant::join(&node, Name::NONE).map_err(|error| Failure::of("node", error))
+    let node = Node::open(directory).or_fail("node")?;
+    Participant::join(&node, Name::NONE).or_fail("node")
 }
 
 /// The writing side.
@@ -99,7 +98,7 @@ impl RecordInlet {
 impl Inlet for RecordInlet {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         let stamp = stamp(self.writer.written());
-        self.writer.write(stamp, message).map(drop).map_err(|error| Failure::of("write", error))
+        self.writer.write(stamp, message).map(drop).or_fail("write")
     }
 }
 

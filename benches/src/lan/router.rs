@@ -2,7 +2,7 @@
 
 use nix::sys::signal::Signal;
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::Child;
+use rohrpost_bench_local::harness::{Child, OrFail};
 use rohrpost_mailbox::{Class, Name, Node, local, node_directory};
 use std::fs;
 use std::os::unix::process::CommandExt;
@@ -67,7 +67,7 @@ impl Router {
     pub fn start(spec: &RouterSpec<'_>, prepare: impl FnOnce() -> Result<(), Failure>) -> Result<Self, Failure> {
         let child = Child::start(|| {
             prepare()?;
-            let log = fs::File::create(spec.log()).map_err(|error| Failure::of("router's log", error))?;
+            let log = fs::File::create(spec.log()).or_fail("router's log")?;
             let error = Command::new(spec.command)
                 .args(["router", "--config"])
                 .arg(spec.config)

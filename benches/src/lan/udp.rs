@@ -3,7 +3,7 @@
 use super::flow::{FILLER, Inlet, Outlet, look_at, put_ends};
 use super::wire::{Wire, address};
 use nix::sys::socket::{setsockopt, sockopt};
-use rohrpost_bench_local::harness::{End, Failure, Link};
+use rohrpost_bench_local::harness::{End, Failure, Link, OrFail};
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
@@ -50,7 +50,7 @@ impl Datagrams {
             socket.connect(other)?;
             Ok(socket)
         };
-        opened().map(Self).map_err(|error| Failure::of("udp socket", error))
+        opened().map(Self).or_fail("udp socket")
     }
 
     /// Sets the timeout of receiving.
@@ -58,7 +58,7 @@ impl Datagrams {
     /// # Errors
     /// When the kernel refuses it.
     pub fn with_patience(self, patience: Duration) -> Result<Self, Failure> {
-        self.0.set_read_timeout(Some(patience)).map_err(|error| Failure::of("udp socket", error))?;
+        self.0.set_read_timeout(Some(patience)).or_fail("udp socket")?;
         Ok(self)
     }
 
@@ -79,7 +79,7 @@ impl Datagrams {
 
 impl Link for Datagrams {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.0.send(message).map(drop).map_err(|error| Failure::of("send", error))
+        self.0.send(message).map(drop).or_fail("send")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
@@ -126,7 +126,7 @@ impl Inlet for RawParts {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         let (datagrams, part) = self.next(message.len());
         put_ends(message, part);
-        datagrams.0.send(part).map(drop).map_err(|error| Failure::of("send", error))
+        datagrams.0.send(part).map(drop).or_fail("send")
     }
 }
 

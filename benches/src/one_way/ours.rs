@@ -2,7 +2,7 @@
 
 use super::{Sink, Source};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::Scratch;
+use rohrpost_bench_local::harness::{OrFail, Scratch};
 use rohrpost_mailbox::{
     Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
@@ -44,10 +44,9 @@ impl OwnNode {
     /// # Errors
     /// When there is no memory for it.
     pub fn source(&self, spins: bool) -> Result<OurSource, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::of("receiver", error);
-        let node = Node::create(&self.path(), 0o700).map_err(|error| failed(&error))?;
-        let participant = Participant::join(&node, MAILBOX).map_err(|error| failed(&error))?;
-        let receiver = participant.receiver(MAILBOX, self.shape).map_err(|error| failed(&error))?;
+        let node = Node::create(&self.path(), 0o700).or_fail("receiver")?;
+        let participant = Participant::join(&node, MAILBOX).or_fail("receiver")?;
+        let receiver = participant.receiver(MAILBOX, self.shape).or_fail("receiver")?;
         let spin = if spins { SPIN } else { Duration::ZERO };
         Ok(OurSource { receiver, waiting: Waiting { spin, deadline: None } })
     }
@@ -57,10 +56,9 @@ impl OwnNode {
     /// # Errors
     /// When it is not.
     pub fn sink(&self, priority: u8, retry: Retry) -> Result<OurSink, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::of("sender", error);
-        let node = Node::open(&self.path()).map_err(|error| failed(&error))?;
-        let participant = Participant::join(&node, Name::NONE).map_err(|error| failed(&error))?;
-        let sender = participant.sender(MAILBOX).map_err(|error| failed(&error))?;
+        let node = Node::open(&self.path()).or_fail("receiver")?;
+        let participant = Participant::join(&node, Name::NONE).or_fail("receiver")?;
+        let sender = participant.sender(MAILBOX).or_fail("receiver")?;
         let label = Label { kind: Type::data(0), priority: Priority(priority), ..Label::default() };
         Ok(OurSink { sender, label, ids: 1, retry })
     }

@@ -1,6 +1,6 @@
 //! A node with one stream, and what its readers and writer say.
 
-use rohrpost_bench_local::harness::{Failure, Scratch};
+use rohrpost_bench_local::harness::{Failure, OrFail, Scratch};
 use rohrpost_mailbox::{
     Name, Next, Node, Participant, Stamp, StreamError, StreamId, StreamReader, StreamShape, StreamWriter,
 };
@@ -24,9 +24,8 @@ impl StreamNode {
     }
 
     fn participant(&self) -> Result<Arc<Participant>, Failure> {
-        let node = Node::create(&self.scratch.directory().join("node"), 0o700);
-        let node = node.map_err(|error| Failure::of("node", error))?;
-        Participant::join(&node, Name::NONE).map_err(|error| Failure::of("participant", error))
+        let node = Node::create(&self.scratch.directory().join("node"), 0o700).or_fail("node")?;
+        Participant::join(&node, Name::NONE).or_fail("participant")
     }
 
     /// Makes the stream.

@@ -7,7 +7,7 @@ use super::node::{StreamNode, came, stamp};
 use crate::floors::ring::CacheLine;
 use crate::one_way::{Sink, Source};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::Zeroable;
+use rohrpost_bench_local::harness::{OrFail, Zeroable};
 use rohrpost_mailbox::{StreamReader, StreamWriter, Waiting};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -52,7 +52,7 @@ impl Sink for RecordSink<'_> {
             // ORDERING: Acquire; pairs with the store in `receive`: what is written over has been read.
             self.read = self.progress.0.0.load(Ordering::Acquire);
         }
-        self.writer.write(stamp(sequence), message).map(drop).map_err(|error| Failure::of("write", error))
+        self.writer.write(stamp(sequence), message).map(drop).or_fail("write")
     }
 }
 

@@ -1,7 +1,7 @@
 //! Two systems that meet at a TCP router, each a single node: real processes, as launch would start them.
 
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, End, Placement, Scheduling, Scratch, interrupted, settle};
+use rohrpost_bench_local::harness::{Child, End, OrFail, Placement, Scheduling, Scratch, interrupted, settle};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Class, Name, node_directory};
@@ -58,10 +58,10 @@ impl Systems {
         let address = free_address()?;
         for end in [End::Ping, End::Pong] {
             let text = configuration(end, security, address);
-            fs::write(config(&scratch, end), text).map_err(|error| Failure::of("configuration", error))?;
+            fs::write(config(&scratch, end), text).or_fail("configuration")?;
         }
         let installation = Installation::load(&config(&scratch, End::Ping));
-        let common = installation.map_err(|errors| Failure::of("configuration", errors))?.digest().common;
+        let common = installation.or_fail("configuration")?.digest().common;
         let mut systems = Self { processes: Vec::new(), command, security, address, common, scratch };
         if security == Security::Tls {
             [End::Ping, End::Pong].into_iter().try_for_each(|end| systems.certify(end))?;
@@ -117,7 +117,7 @@ impl Systems {
     pub fn seal(&self) -> Result<Option<ClientSeal>, Failure> {
         let holder = Holder::Node { node: name_of(End::Pong).into(), system: system_of(End::Pong) };
         let load = || ClientSeal::load(&self.scratch.directory().join("certificates"), &holder);
-        (self.security == Security::Tls).then(load).transpose().map_err(|error| Failure::of("certificates", error))
+        (self.security == Security::Tls).then(load).transpose().or_fail("certificates")
     }
 
     /// The directory of an end's node.
@@ -140,8 +140,11 @@ impl Systems {
     }
 
     fn certify(&self, end: End) -> Result<(), Failure> {
-        let made = Command::new(&self.command).args(["keys", "new"]).arg(config(&self.scratch, end)).output();
-        let made = made.map_err(|error| Failure::of("rohrpost keys new", error))?;
+        let made = Command::new(&self.command)
+            .args(["keys", "new"])
+            .arg(config(&self.scratch, end))
+            .output()
+            .or_fail("rohrpost keys new")?;
         let said = || Failure::of("rohrpost keys new", String::from_utf8_lossy(&made.stderr));
         if made.status.success() { Ok(()) } else { Err(said()) }
     }
@@ -149,7 +152,7 @@ impl Systems {
     fn launch(&mut self, what: &str, name: &str, end: End, place: End) -> Result<(), Failure> {
         let log = self.scratch.directory().join(format!("{what}-{}.log", name_of(end)));
         let child = Child::start(|| {
-            let log = fs::File::create(&log).map_err(|error| Failure::of("log", error))?;
+            let log = fs::File::create(&log).or_fail("log")?;
             settle(place, Placement::TwoCores, Scheduling::Fifo)?;
             let error = Command::new(&self.command)
                 .args([what, "--name", name, "--config"])
@@ -193,7 +196,7 @@ impl Systems {
             .arg(config(&self.scratch, end))
             .env("ROHRPOST_DIR", self.scratch.directory())
             .output();
-        let output = asked.map_err(|error| Failure::of("rohrpost net", error))?;
+        let output = asked.or_fail("rohrpost net")?;
         // The file is empty until the client writes.
         let told: Vec<StatusJson> = serde_json::from_slice(&output.stdout).unwrap_or_default();
         Ok(told.into_iter().filter_map(|told| told.beyond).any(|beyond| beyond.state == "up"))
@@ -238,7 +241,7 @@ pub fn free_address() -> Result<SocketAddr, Failure> {
     // 127.128.0.0/9 without its first and last addresses; a PID has 22 bits.
     let own = Ipv4Addr::new(127, 128 | high, middle, low.clamp(1, 254));
     let found = TcpListener::bind((own, 0)).and_then(|listener| listener.local_addr());
-    found.map_err(|error| Failure::of("a free port", error))
+    found.or_fail("a free port")
 }
 
 fn configuration(end: End, security: Security, at: SocketAddr) -> String {

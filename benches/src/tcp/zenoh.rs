@@ -2,7 +2,7 @@
 //! only compiled on demand.
 
 use super::systems::free_address;
-use rohrpost_bench_local::harness::{Cell, Child, Failure, Scratch, interrupted};
+use rohrpost_bench_local::harness::{Cell, Child, Failure, OrFail, Scratch, interrupted};
 use std::fs::{self, File};
 use std::net::{SocketAddr, TcpStream};
 use std::os::unix::process::CommandExt;
@@ -43,11 +43,11 @@ pub fn time_zenoh(cell: &Cell) -> Result<Vec<f64>, Failure> {
     if lines.pop() != Some(END) {
         return Err(Failure::Failed(format!("zenoh's ping did not end: {said}")));
     }
-    lines.iter().map(|line| line.parse::<f64>().map_err(|error| Failure::of(line, error))).collect()
+    lines.iter().map(|line| line.parse::<f64>().or_fail(line)).collect()
 }
 
 fn program() -> Result<PathBuf, Failure> {
-    let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+    let own = std::env::current_exe().or_fail("this program")?;
     let path = own.with_file_name(PROGRAM);
     let how = "cargo build --release --manifest-path benches/zenoh/Cargo.toml --target-dir target";
     if path.is_file() { Ok(path) } else { Err(Failure::Skipped(format!("no {}; {how}", path.display()))) }
@@ -55,8 +55,8 @@ fn program() -> Result<PathBuf, Failure> {
 
 fn start(program: &Path, arguments: &[&str], scratch: &Scratch, name: &str) -> Result<Child, Failure> {
     Child::start(|| {
-        let said = File::create(said(scratch, name)).map_err(|error| Failure::of(name, error))?;
-        let errors = said.try_clone().map_err(|error| Failure::of(name, error))?;
+        let said = File::create(said(scratch, name)).or_fail(name)?;
+        let errors = said.try_clone().or_fail(name)?;
         let error = Command::new(program).args(arguments).stdin(Stdio::null()).stdout(said).stderr(errors).exec();
         Err(Failure::of(PROGRAM, error))
     })

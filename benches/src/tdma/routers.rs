@@ -7,7 +7,7 @@ use super::rights::Rights;
 use super::stage::{NODES, Place, Stage};
 use crate::lan::router::{Router, RouterSpec, end_all};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Machine, Scratch, interrupted};
+use rohrpost_bench_local::harness::{Machine, OrFail, Scratch, interrupted};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{Node, SystemClock};
 use std::fs;
@@ -42,7 +42,7 @@ impl<'a> Routers<'a> {
         // Without it, three routers report the same.
         plan.installation()?;
         let config = scratch.directory().join("bench-tdma.toml");
-        fs::write(&config, plan.text()).map_err(|error| Failure::of("configuration", error))?;
+        fs::write(&config, plan.text()).or_fail("configuration")?;
         let mut all = Self { stage, scratch, command, config, rights, routers: Vec::new() };
         for node in 0..NODES {
             let router = all.launch(node)?;
@@ -87,7 +87,7 @@ impl<'a> Routers<'a> {
     /// # Errors
     /// When it has none.
     pub fn clock(&self, node: u8) -> Result<SystemClock, Failure> {
-        let node = Node::open(&self.directory(node)).map_err(|error| Failure::of("node", error))?;
+        let node = Node::open(&self.directory(node)).or_fail("node")?;
         Ok(SystemClock::open(&node))
     }
 

@@ -6,7 +6,7 @@ use super::stage::{NODES, Place, Stage};
 use crate::lan::router::{ROUTER, SYSTEM};
 use crate::lan::skewed::{SKEW, Shown};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::Scratch;
+use rohrpost_bench_local::harness::{OrFail, Scratch};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, monotonic_ns, realtime_ns};
 use rohrpost_routers::settings::Settings;
@@ -107,10 +107,8 @@ impl Member {
     fn start(stage: &Stage, installation: &Installation, own: u8, scratch: &Scratch) -> Result<Self, Failure> {
         let place = Place::Node(own);
         stage.enter(place)?;
-        let node = Node::create(&scratch.directory().join(place.name()), 0o700);
-        let node = node.map_err(|error| Failure::of("node", error))?;
-        let settings = Settings::new(installation, &place.name(), realtime_ns());
-        let settings = settings.map_err(|error| Failure::of("configuration", error))?;
+        let node = Node::create(&scratch.directory().join(place.name()), 0o700).or_fail("node")?;
+        let settings = Settings::new(installation, &place.name(), realtime_ns()).or_fail("configuration")?;
         let skew = if own == 0 {
             Skew::default()
         } else {
@@ -123,7 +121,7 @@ impl Member {
         let name = Name::new(SYSTEM, ROUTER.0, own, 0);
         let faults = Arc::new(Silence);
         let parts = Parts { node: &node, name, settings, faults, sockets: Vec::new(), impair: None, clock };
-        let shell = Shell::start(parts).map_err(|error| Failure::of("router", error))?;
+        let shell = Shell::start(parts).or_fail("router")?;
         Ok(Self { skew, shell: Some(shell) })
     }
 

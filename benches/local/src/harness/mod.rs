@@ -44,3 +44,18 @@ impl Failure {
         Self::Failed(format!("{what}: {error}"))
     }
 }
+
+/// Results with errors of all kinds.
+pub trait OrFail<T> {
+    /// The error as one of doing `what`.
+    ///
+    /// # Errors
+    /// When it is one.
+    fn or_fail(self, what: &str) -> Result<T, Failure>;
+}
+
+impl<T, E: std::fmt::Display> OrFail<T> for Result<T, E> {
+    fn or_fail(self, what: &str) -> Result<T, Failure> {
+        self.map_err(|error| Failure::of(what, error))
+    }
+}

@@ -1,6 +1,6 @@
 //! Memory that the parent and its forked processes share.
 
-use super::Failure;
+use super::{Failure, OrFail};
 use std::num::NonZeroUsize;
 use std::ops::Deref;
 use std::ptr::NonNull;
@@ -30,7 +30,7 @@ impl<T: Zeroable> Shared<T> {
         let access = ProtFlags::PROT_READ | ProtFlags::PROT_WRITE;
         // SAFETY: a new mapping wherever the kernel likes; it replaces nothing.
         let at = unsafe { mmap_anonymous(None, bytes, access, MapFlags::MAP_SHARED | MapFlags::MAP_POPULATE) };
-        Ok(Self { at: at.map_err(|error| Failure::of("shared memory", error))?.cast() })
+        Ok(Self { at: at.or_fail("shared memory")?.cast() })
     }
 }
 

@@ -1,7 +1,6 @@
 //! What turns of all programs have in common.
 
 use rohrpost_bench_local::harness::{Cell, Pause, Placement, Scheduling};
-use rohrpost_bench_local::rounds::{Target, Versus};
 use rohrpost_bench_local::settings::Settings;
 use std::time::Duration;
 
@@ -24,9 +23,4 @@ pub(super) fn cell(settings: &Settings) -> Cell {
         pause: Pause::UNTIL_ASLEEP,
         cap: CAP,
     }
-}
-
-/// The target that most cases here have.
-pub(super) fn at_most(name: &'static str, bound: f64) -> Versus {
-    Versus { name, p50: Some(Target::AtMost(bound)), p99: None }
 }

@@ -28,11 +28,9 @@ pub(super) const WITHIN_ALONE: [Goal; 1] = [Goal { name: "hoped bound", most: 1.
 const NOT_VACUOUS: [Goal; 1] = [Goal { name: "must 3 times", most: 3.0 }];
 const STOLEN: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Flows)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("flows", None, "us", flows)]
 }
-
-struct Flows;
 
 /// One turn.
 struct FlowTurns {
@@ -45,20 +43,14 @@ struct FlowTurns {
     bare: BareThreads,
 }
 
-impl Case for Flows {
-    fn name(&self) -> String {
-        "flows".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let turn = |_| {
-            let _alone = alone()?;
-            watch(&Stage::new()?, settings)
-        };
-        match (0..settings.rounds.max(1)).map(turn).collect::<Result<Vec<_>, Failure>>() {
-            Ok(turns) => rows(&turns),
-            Err(failure) => Ok(vec![Row::alone(subject("flows", "us"), "all", Err(failure))]),
-        }
+fn flows(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let turn = |_| {
+        let _alone = alone()?;
+        watch(&Stage::new()?, settings)
+    };
+    match (0..settings.rounds.max(1)).map(turn).collect::<Result<Vec<_>, Failure>>() {
+        Ok(turns) => rows(&turns),
+        Err(failure) => Ok(vec![Row::alone(subject.clone(), "all", Err(failure))]),
     }
 }
 

@@ -37,11 +37,9 @@ const PROMISED: &str = "check";
 /// Past a replicated flood, beside unloaded: of the most urgent flow.
 const URGENT: Versus = Versus { name: WITHOUT, p50: Some(Target::AtMost(1.5)), p99: Some(Target::AtMost(2.0)) };
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Replicas)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("replicas", None, "us", replicas)]
 }
-
-struct Replicas;
 
 /// One turn.
 struct ReplicaTurn {
@@ -59,25 +57,19 @@ struct ReplicaRound {
     late_us: Vec<f64>,
 }
 
-impl Case for Replicas {
-    fn name(&self) -> String {
-        "replicas".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let round = |number: usize| {
-            let (_alone, stage) = (alone()?, Stage::new()?);
-            // Each round begins with the other.
-            let first = watch(&stage, settings, number.is_multiple_of(2))?;
-            let second = watch(&stage, settings, !number.is_multiple_of(2))?;
-            let (beside, without) = if number.is_multiple_of(2) { (first, second) } else { (second, first) };
-            let late_us = BareThreads::turn(&stage, &REPLICAS, false, watched(settings))?.late_us;
-            Ok(ReplicaRound { beside, without, late_us })
-        };
-        match (0..settings.rounds.max(1)).map(round).collect::<Result<Vec<_>, Failure>>() {
-            Ok(rounds) => rows(&rounds),
-            Err(failure) => Ok(vec![Row::alone(subject("replicas", "us"), BESIDE, Err(failure))]),
-        }
+fn replicas(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let round = |number: usize| {
+        let (_alone, stage) = (alone()?, Stage::new()?);
+        // Each round begins with the other.
+        let first = watch(&stage, settings, number.is_multiple_of(2))?;
+        let second = watch(&stage, settings, !number.is_multiple_of(2))?;
+        let (beside, without) = if number.is_multiple_of(2) { (first, second) } else { (second, first) };
+        let late_us = BareThreads::turn(&stage, &REPLICAS, false, watched(settings))?.late_us;
+        Ok(ReplicaRound { beside, without, late_us })
+    };
+    match (0..settings.rounds.max(1)).map(round).collect::<Result<Vec<_>, Failure>>() {
+        Ok(rounds) => rows(&rounds),
+        Err(failure) => Ok(vec![Row::alone(subject.clone(), BESIDE, Err(failure))]),
     }
 }
 

@@ -44,11 +44,9 @@ const STEP: [Goal; 1] = [Goal { name: "hoped 5 us", most: 5.0 }];
 const FALSE: [Goal; 2] = [Goal { name: "must 1", most: 1.0 }, Goal { name: "hoped none", most: 0.0 }];
 const WITHOUT_SYNC: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Takeover)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("takeover", None, "cycles", takeover)]
 }
-
-struct Takeover;
 
 /// Of all rounds.
 #[derive(Default)]
@@ -62,22 +60,16 @@ struct Found {
     without_sync: Vec<f64>,
 }
 
-impl Case for Takeover {
-    fn name(&self) -> String {
-        "takeover".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let mut found = Found::default();
-        let watched = (0..settings.rounds.max(1)).try_for_each(|_| {
-            let _alone = alone()?;
-            watch(&Stage::new()?, settings, &mut found)
-        });
-        Ok(match watched {
-            Ok(()) => found.rows(),
-            Err(failure) => vec![Row::alone(subject("takeover", "cycles"), "all", Err(failure))],
-        })
-    }
+fn takeover(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let mut found = Found::default();
+    let watched = (0..settings.rounds.max(1)).try_for_each(|_| {
+        let _alone = alone()?;
+        watch(&Stage::new()?, settings, &mut found)
+    });
+    Ok(match watched {
+        Ok(()) => found.rows(),
+        Err(failure) => vec![Row::alone(subject.clone(), "all", Err(failure))],
+    })
 }
 
 fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Failure> {
