@@ -10,8 +10,8 @@
 //! Only what was sent while the mailbox was full counts: from before the send until it has been copied out.
 
 use crate::floors::ring::DEPTH;
-use crate::floors::{Queue, TwoRings, TwoRingsReceiver, TwoRingsSender};
-use crate::one_way::{OwnNode, QueueSink, Retry, Sink, Source};
+use crate::floors::{Queue, QueueSink, TwoRings, TwoRingsReceiver, TwoRingsSender};
+use crate::one_way::{OwnNode, Retry, Sink, Source};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
     Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle,

@@ -5,8 +5,8 @@
 //! counted.
 
 use crate::counting::heap_uses;
-use crate::floors::Queue;
-use crate::one_way::{OwnNode, QueueSink, Retry, Sink, Source};
+use crate::floors::{Queue, QueueSink};
+use crate::one_way::{OwnNode, Retry, Sink, Source};
 use nix::sys::ptrace;
 use nix::sys::signal::{Signal, kill, raise};
 use nix::sys::wait::{WaitStatus, waitpid};
@@ -125,7 +125,7 @@ fn queue_under(batches: usize) -> Result<usize, Failure> {
         }
         mark();
         for _ in 0..BATCH {
-            Source::receive(&mut source, &mut message)?;
+            source.receive(&mut message)?;
         }
     }
     Ok(batches * BATCH)

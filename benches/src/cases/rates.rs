@@ -3,9 +3,9 @@
 //! A full mailbox rejects, and its sender tries again, so nothing is lost. The rings and queues beside it make
 //! their senders wait, too.
 
-use crate::floors::Queue;
 use crate::floors::ring::{BareRing, DEPTH, Futex, RingReceiver, RingSender, SharedRing as Ring};
-use crate::one_way::{OwnNode, QueueSink, Retry, Stream, rate};
+use crate::floors::{Queue, QueueSink};
+use crate::one_way::{OwnNode, Retry, Stream, rate};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Failure, Scheduling, Shared};
 use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_least, compare};

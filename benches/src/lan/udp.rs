@@ -1,7 +1,8 @@
 //! Datagrams from socket to socket, as the kernel carries them: one system call to send, one to receive.
 
-use super::flow::{FILLER, Inlet, Outlet, look_at, put_ends};
+use super::flow::{FILLER, Outlet, look_at, put_ends};
 use super::wire::{Wire, address};
+use crate::one_way::Sink;
 use nix::sys::socket::{setsockopt, sockopt};
 use rohrpost_bench_local::harness::{End, Failure, Link, OrFail};
 use std::io;
@@ -31,9 +32,8 @@ impl Datagrams {
     /// When that is refused.
     pub fn between(wire: &Wire, end: End, ports: [u16; 2]) -> Result<Self, Failure> {
         wire.enter(end)?;
-        let (own, other) = if end == End::Ping { (0, 1) } else { (1, 0) };
-        let other_end = if end == End::Ping { End::Pong } else { End::Ping };
-        Self::connect((address(end), ports[own]).into(), (address(other_end), ports[other]).into())
+        let [own, other] = [end, end.other()].map(|end| (address(end), ports[end.index()]).into());
+        Self::connect(own, other)
     }
 
     /// From one address to another, in the place where the calling thread is.
@@ -88,7 +88,7 @@ impl Link for Datagrams {
     }
 }
 
-impl Inlet for Datagrams {
+impl Sink for Datagrams {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         Link::send(self, message)
     }
@@ -122,7 +122,7 @@ impl RawParts {
     }
 }
 
-impl Inlet for RawParts {
+impl Sink for RawParts {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         let (datagrams, part) = self.next(message.len());
         put_ends(message, part);

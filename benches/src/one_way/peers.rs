@@ -10,18 +10,6 @@ use std::time::Instant;
 /// How many messages wait at most.
 const DEPTH: usize = crate::floors::ring::DEPTH;
 
-impl Sink for IceoryxSender {
-    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.publish(message)
-    }
-}
-
-impl Source for IceoryxReceiver {
-    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
-        self.take(message)
-    }
-}
-
 /// Messages a second through iceoryx2; the receiver spins, or waits for a notifier.
 ///
 /// # Errors

@@ -2,8 +2,8 @@
 
 use super::node::{came, stamp, stream_failure};
 use rohrpost_bench_local::harness::{End, Failure, Link, Meetings, OrFail};
-use rohrpost_bench_local::ours::How;
-use rohrpost_mailbox::{Name, Node, Participant, StreamId, StreamReader, StreamShape, StreamWriter, Waiting};
+use rohrpost_bench_local::ours::{How, join, name};
+use rohrpost_mailbox::{StreamId, StreamReader, StreamShape, StreamWriter, Waiting};
 use std::path::Path;
 use std::time::Duration;
 
@@ -31,12 +31,8 @@ impl StreamLink {
     /// When the streams cannot be made.
     pub fn open(directory: &Path, end: End, bytes: usize, how: How, meetings: &mut Meetings) -> Result<Self, Failure> {
         let record_bytes = u32::try_from(bytes).or_fail("record")?;
-        let (mine, other) = match end {
-            End::Ping => (Name::new(1, 1, 0, 0), Name::new(1, 2, 0, 0)),
-            End::Pong => (Name::new(1, 2, 0, 0), Name::new(1, 1, 0, 0)),
-        };
-        let node = Node::create(directory, 0o700).or_fail("node")?;
-        let participant = Participant::join(&node, mine).or_fail("participant")?;
+        let [mine, other] = [end, end.other()].map(name);
+        let participant = join(directory, mine)?;
         let id = |name| StreamId { name, number: 1 };
         let shape = StreamShape { record_bytes, keep: KEEP, readers: 1, late: Duration::ZERO };
         let writer = participant.stream_writer(id(mine), shape).map_err(stream_failure)?;

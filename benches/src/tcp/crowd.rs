@@ -11,7 +11,7 @@ use super::tally::Tally;
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use nix::sys::timerfd::TimerFd;
-use rohrpost_bench_local::harness::{Child, End, Failure, OrFail, Placement, Scheduling, Shared, interrupted, settle};
+use rohrpost_bench_local::harness::{Child, End, Failure, OrFail, Placement, Scheduling, Shared, look_for, settle};
 use rohrpost_mailbox::monotonic_ns;
 use std::time::{Duration, Instant};
 
@@ -115,24 +115,10 @@ impl Crowd {
     }
 
     fn await_until(&mut self, patience: Duration, is_so: impl Fn(&Tally) -> bool) -> Result<(), Failure> {
-        let give_up = Instant::now() + patience;
-        while !is_so(&self.tally) {
-            if interrupted() {
-                return Err(Failure::Failed("interrupted".into()));
-            }
-            if !self.is_there()? {
-                return Ok(());
-            }
-            if Instant::now() > give_up {
-                return Err(Failure::Failed(format!(
-                    "{} of {} sessions are there",
-                    self.tally.up.get(),
-                    self.habits.guests
-                )));
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        Ok(())
+        let look = || Ok((is_so(&self.tally) || !self.is_there()?).then_some(()));
+        let so = look_for(patience, Duration::from_millis(5), look)?;
+        let up = self.tally.up.get();
+        so.ok_or_else(|| Failure::Failed(format!("{up} of {} sessions are there", self.habits.guests)))
     }
 }
 

@@ -3,8 +3,8 @@
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use rohrpost_bench_local::hand_over::{HandOver, Lanes, Wake};
 use rohrpost_bench_local::harness::{End, Failure, Link, OrFail, Shared};
-use rohrpost_bench_local::ours::Station;
-use rohrpost_mailbox::{Interest, Name, Node, Participant, Receiver, Shape, Waiting, Watches};
+use rohrpost_bench_local::ours::{Station, join, shape};
+use rohrpost_mailbox::{Interest, Name, Receiver, Waiting, Watches};
 use std::fs::File;
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -112,11 +112,8 @@ pub(super) struct MailboxDoor {
 impl MailboxDoor {
     /// For the relay, on the node in this directory.
     pub(super) fn open(directory: &Path, socket: &TcpStream, bytes: usize) -> Result<Self, Failure> {
-        let body_bytes_max = u16::try_from(bytes).or_fail("mailbox")?;
-        let node = Node::create(directory, 0o700).or_fail("mailbox")?;
-        let participant = Participant::join(&node, RELAY).or_fail("mailbox")?;
-        let shape = Shape { body_bytes_max, ..Shape::default() };
-        let receiver = participant.receiver(RELAY, shape).or_fail("mailbox")?;
+        let participant = join(directory, RELAY)?;
+        let receiver = participant.receiver(RELAY, shape(bytes)?).or_fail("mailbox")?;
         let mut watches = Watches::new(&participant).or_fail("mailbox")?;
         watches.add(socket, Interest::Read).or_fail("mailbox")?;
         Ok(Self { receiver, watches, back: Station::open(directory, None, MODULE, bytes)? })

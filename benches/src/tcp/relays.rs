@@ -29,7 +29,7 @@ const PIECE_BYTES: usize = 64 * 1024;
 /// What a relay failed with, else an end.
 pub fn time_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
     let halls = [Hall::new()?, Hall::new()?];
-    let hall = |end| &halls[usize::from(end == End::Pong)];
+    let hall = |end: End| &halls[end.index()];
     time(cell, |end, _| hall(end).door(), |end| hall(end).module())
 }
 
@@ -40,7 +40,7 @@ pub fn time_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
 /// As [`time_relays`].
 pub fn time_mailbox_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
-    let directory = |end| scratch.directory().join(if end == End::Ping { "near" } else { "far" });
+    let directory = |end: End| scratch.directory().join(end.node());
     let door = |end, socket: &TcpStream| MailboxDoor::open(&directory(end), socket, cell.bytes);
     time(cell, door, |end| MailboxDoor::module(&directory(end), cell.bytes))
 }

@@ -6,7 +6,7 @@ use super::stage::{NODES, Place, Stage};
 use crate::lan::router::{ROUTER, SYSTEM};
 use crate::lan::skewed::{SKEW, Shown};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{OrFail, Scratch};
+use rohrpost_bench_local::harness::{OrFail, Scratch, look_for};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, monotonic_ns, realtime_ns};
 use rohrpost_routers::settings::Settings;
@@ -14,7 +14,7 @@ use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
 use rohrpost_routers::time::Role;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// As many exchanges as the filter of a clock holds.
 const SETTLED: u64 = 64;
@@ -58,24 +58,14 @@ impl Shells {
     /// # Errors
     /// What they show, if one does not.
     pub fn await_settled(&self) -> Result<u8, Failure> {
-        let give_up = Instant::now() + SETTLES_WITHIN;
-        loop {
-            if let Some(master) = self.master()
-                && self
-                    .members
-                    .iter()
-                    .enumerate()
-                    .all(|(node, member)| node == usize::from(master) || member.is_settled())
-            {
-                return Ok(master);
-            }
-            if Instant::now() > give_up {
-                let shells = self.members.iter().filter_map(|member| member.shell.as_ref()?.clock());
-                let seen: Vec<_> = shells.map(|clock| clock.snapshot()).collect();
-                return Err(Failure::Failed(format!("a slave has no time: {seen:?}")));
-            }
-            std::thread::sleep(LOOK_EACH);
-        }
+        let settled =
+            |master: &u8| (0..).zip(&self.members).all(|(node, member)| node == *master || member.is_settled());
+        let master = look_for(SETTLES_WITHIN, LOOK_EACH, || Ok(self.master().filter(settled)))?;
+        master.ok_or_else(|| {
+            let shells = self.members.iter().filter_map(|member| member.shell.as_ref()?.clock());
+            let seen: Vec<_> = shells.map(|clock| clock.snapshot()).collect();
+            Failure::Failed(format!("a slave has no time: {seen:?}"))
+        })
     }
 
     /// The node that takes itself for the master, if there is exactly one.

@@ -132,6 +132,18 @@ pub fn fill(message: &mut [u8], number: u64) {
     body.fill(number as u8);
 }
 
+/// Copies what came, which must be as long as what is expected.
+///
+/// # Errors
+/// When it is not.
+pub fn copy_whole(came: &[u8], message: &mut [u8]) -> Result<(), Failure> {
+    if came.len() != message.len() {
+        return Err(Failure::Failed(format!("{} bytes came, not {}", came.len(), message.len())));
+    }
+    message.copy_from_slice(came);
+    Ok(())
+}
+
 /// The message must be the very one that was sent.
 ///
 /// # Errors

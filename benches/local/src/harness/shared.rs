@@ -14,6 +14,9 @@ use std::time::{Duration, Instant};
 /// has no pointer and need not be dropped.
 pub unsafe trait Zeroable: Sync {}
 
+// SAFETY: made of such.
+unsafe impl<T: Zeroable, const N: usize> Zeroable for [T; N] {}
+
 /// One `T` in anonymous memory, zeroed and resident before any timing. Freed with the last process that has it.
 pub struct Shared<T: Zeroable> {
     at: NonNull<T>,

@@ -11,7 +11,7 @@ use crate::lan::skewed::{SKEW, Shown, error_us};
 use crate::lan::udp::Datagrams;
 use crate::lan::wire::address;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{End, Failure, OrFail, sample_in_child};
+use rohrpost_bench_local::harness::{End, Failure, OrFail, look_for, sample_in_child};
 use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
@@ -19,7 +19,7 @@ use rohrpost_mailbox::monotonic_ns;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::shell::clock::{ClockParts, ClockService, Skew};
 use rohrpost_routers::time::{Role, TimeSettings};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How often the clocks are read, and how many times in a turn.
 const EACH: Duration = Duration::from_millis(1);
@@ -72,13 +72,9 @@ fn errors_us(wire: &Wire, settings: &Settings) -> Result<Vec<f64>, Failure> {
     sample_in_child(PATIENCE, |samples| {
         let master = Timed::start(wire, End::Ping)?;
         let slave = Timed::start(wire, End::Pong)?;
-        let give_up = Instant::now() + PATIENCE;
-        while !slave.is_settled() {
-            if Instant::now() > give_up {
-                return Err(Failure::Failed(format!("the slave has no time: {:?}", slave.service.state().snapshot())));
-            }
-            std::thread::sleep(EACH);
-        }
+        let seen = || slave.service.state().snapshot();
+        let settled = look_for(PATIENCE, EACH, || Ok(slave.is_settled().then_some(())))?;
+        settled.ok_or_else(|| Failure::Failed(format!("the slave has no time: {:?}", seen())))?;
         for _ in 0..settings.count(SAMPLES) {
             std::thread::sleep(EACH);
             samples.push(error_us(&master.shown(), &slave.shown())?);

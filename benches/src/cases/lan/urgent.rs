@@ -25,10 +25,11 @@
 use super::ground::LanSegment;
 use crate::lan::Wire;
 use crate::lan::ends::{LanSink, LanSource};
-use crate::lan::flow::{Inlet, LOOK, Outlet};
+use crate::lan::flow::{LOOK, Outlet};
 use crate::lan::nodes::{self, Network, Nodes};
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::udp::Datagrams;
+use crate::one_way::Sink;
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
     Cell, Child, End, Failure, Gate, Pause, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
@@ -89,16 +90,8 @@ struct Urgent {
 impl Urgent {
     fn measure(&self, settings: &Settings, subject: &Subject) -> Vec<Row> {
         let ground = LanSegment::new(settings, &self.network);
-        let messages = settings.count(MESSAGES);
-        let cell = Cell {
-            bytes: BYTES,
-            messages,
-            warm_up: WARM_UP.min(messages / 10),
-            placement: Placement::TwoCores,
-            scheduling: Scheduling::Fifo,
-            pause: Pause::Asleep(PACE),
-            cap: CAP,
-        };
+        let hop = Cell::hop(BYTES, settings.count(MESSAGES));
+        let cell = Cell { warm_up: hop.warm_up.min(WARM_UP), pause: Pause::Asleep(PACE), cap: CAP, ..hop };
         let floods = [RefCell::new(Vec::new()), RefCell::new(Vec::new())];
         let beside = |flood: Flooder, floods: &RefCell<Vec<_>>, samples: Result<Vec<f64>, Failure>| {
             let flooded = flood.end();
@@ -215,7 +208,7 @@ impl Flooder {
                 sent_bytes = may_bytes.saturating_sub((LULL.as_secs_f64() * bytes_s as f64) as u64).max(sent_bytes);
                 let may = sent_bytes <= may_bytes;
                 if may {
-                    Inlet::send(&mut socket, message)?;
+                    Sink::send(&mut socket, message)?;
                     sent_bytes += FLOOD_BYTES as u64 + WIRE_BYTES;
                 }
                 Ok(may)

@@ -3,8 +3,8 @@
 use super::workload::{NAME, Workload};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
-    Cell, Child, End, Failure, Link, Meetings, OrFail, Pause, Placement, Scheduling, Scratch, Shared, Zeroable,
-    given_away, interrupted, require_asleep, time_two_processes,
+    Cell, Child, End, Failure, Link, Meetings, OrFail, Pause, Scratch, Shared, Zeroable, given_away, interrupted,
+    require_asleep, time_two_processes,
 };
 use rohrpost_bench_local::ours::{How, Mailboxes};
 use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
@@ -18,12 +18,8 @@ use std::time::{Duration, Instant};
 
 /// Of the packages: a speed.
 const BYTES: usize = 64;
-/// Round trips of a turn, and those before them that do not count.
-const MESSAGES: usize = 10_000;
-const WARM_UP: usize = 1_000;
 /// Before each round trip: the other end goes to sleep meanwhile, so that all find it so.
 const PAUSE: Duration = Duration::from_micros(100);
-const CAP: Duration = Duration::from_secs(2);
 /// What is recorded meanwhile: 50 MB in a second, as scans of 62 kB.
 const RECORDED_BYTES: usize = 62_000;
 const RECORDED_PERIOD: Duration = Duration::from_micros(1240);
@@ -50,15 +46,7 @@ pub(super) fn case() -> Case {
 }
 
 fn pair_beside(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
-    let cell = Cell {
-        bytes: BYTES,
-        messages: settings.count(MESSAGES),
-        warm_up: settings.count(WARM_UP),
-        placement: Placement::TwoCores,
-        scheduling: Scheduling::Fifo,
-        pause: Pause::Asleep(PAUSE),
-        cap: CAP,
-    };
+    let cell = Cell { pause: Pause::Asleep(PAUSE), ..Cell::hop(BYTES, settings.count(Cell::HOP_MESSAGES)) };
     let contenders = [
         Contender::sampled("rohrpost", || while_recorded(|| pair(&cell))),
         Contender::sampled("without recorder", || pair(&cell)).beside(None, at_most(1.1)),
@@ -88,7 +76,7 @@ struct CountedEnd<'a> {
 impl<'a> CountedEnd<'a> {
     fn open(node: &Path, end: End, turn: &'a PairTurn, meetings: &mut Meetings) -> Result<Self, Failure> {
         let link = Mailboxes::open(node, end, BYTES, How::Blocking, meetings)?;
-        Ok(Self { link, end: usize::from(end == End::Pong), turn, before: None })
+        Ok(Self { link, end: end.index(), turn, before: None })
     }
 }
 

@@ -6,7 +6,7 @@
 use crate::cases::rivals::ICEORYX_LOANED;
 use crate::streams::StreamLink;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{Cell, Failure, Pause, Placement, Scheduling, Scratch, time_two_processes};
+use rohrpost_bench_local::harness::{Cell, Failure, Pause, Scratch, time_two_processes};
 use rohrpost_bench_local::latency::{FUTEX, Rival, SPIN, TOUCHED};
 use rohrpost_bench_local::ours::How;
 use rohrpost_bench_local::rounds::{Contender, at_most, compare};
@@ -56,15 +56,12 @@ fn in_place(bytes: usize) -> Case {
 
 /// A turn of records of 64 bytes.
 fn cell(settings: &Settings, how: How) -> Cell {
-    Cell {
-        bytes: SMALL,
-        messages: settings.count(MESSAGES),
-        warm_up: settings.count(WARM_UP).min(MESSAGES / 10),
-        placement: Placement::TwoCores,
-        scheduling: Scheduling::Fifo,
-        pause: if how == How::Blocking { Pause::UNTIL_ASLEEP } else { Pause::None },
-        cap: if how == How::Blocking { CAP_ASLEEP } else { CAP_AWAKE },
-    }
+    let (pause, cap) = match how {
+        How::Blocking => (Pause::UNTIL_ASLEEP, CAP_ASLEEP),
+        How::Spinning | How::Loaned => (Pause::None, CAP_AWAKE),
+    };
+    let warm_up = settings.count(WARM_UP);
+    Cell { warm_up, pause, cap, ..Cell::hop(SMALL, settings.count(MESSAGES)) }
 }
 
 /// One turn of ours.

@@ -6,7 +6,7 @@ use crate::tcp::relays::{time_mailbox_relays, time_relays};
 use crate::tcp::systems::{Security, Systems, bench};
 use crate::tcp::zenoh::time_zenoh;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{Cell, End, Failure, time_two_processes};
+use rohrpost_bench_local::harness::{Cell, Failure, time_two_processes};
 use rohrpost_bench_local::rounds::{Contender, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use std::cell::Cell as Counter;
@@ -76,7 +76,7 @@ impl TcpSegment {
         let turn = self.turns.get();
         self.turns.set(turn.wrapping_add(1));
         time_two_processes(cell, |end, meetings| {
-            let other = if end == End::Ping { End::Pong } else { End::Ping };
+            let other = end.other();
             let names = [bench(end, turn), bench(other, turn)];
             Module::between(&systems.directory(end), names, cell.bytes, meetings)
                 .map(|module| module.with_patience(LOST))

@@ -2,8 +2,7 @@
 //! the master.
 
 use super::contest::BARE;
-use super::goals::{Goal, figure, spread};
-use super::observed::ALL;
+use super::goals::{Goal, figure, spread, subject};
 use super::plans::LOADED;
 use crate::tdma::bare::BareThreads;
 use crate::tdma::capture::Capture;
@@ -77,7 +76,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
     let mut routers = Routers::start(stage, &LOADED, Rights::RealTime, settings)?;
     let mut capture = Capture::start(stage)?;
     let traffic = Traffic::start(&routers)?;
-    routers.await_packages(&ALL, &mut capture)?;
+    routers.await_packages(&mut capture)?;
     let mut found_here = Vec::new();
     // With few kills the same master may die each time, when masters change by themselves.
     let both_died = |killed: &[TakenOver]| (0..).zip(DEAD).all(|(dead, _)| killed.iter().any(|kill| kill.dead == dead));
@@ -88,7 +87,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
         let taken_over = kill_master(&mut routers, &mut capture, &LOADED, (kill as f64 * GOLDEN).fract())?;
         routers.start_again(taken_over.dead)?;
         // A returning node listens, follows, and sends again.
-        routers.await_packages(&ALL, &mut capture)?;
+        routers.await_packages(&mut capture)?;
         found_here.push(taken_over);
     }
     found.killed.append(&mut found_here);
@@ -151,10 +150,6 @@ impl Found {
         rows.extend(figure(&subject("takeover, kills", "kills"), "all", &[self.killed.len() as f64], &[]));
         rows
     }
-}
-
-fn subject(case: &str, unit: &'static str) -> Subject {
-    Subject { case: case.into(), bytes: None, unit }
 }
 
 #[cfg(test)]
