@@ -9,7 +9,7 @@
 //! ```
 
 use rohrpost_bench_local::harness::{
-    Cell, Child, End, Failure, GRACE, Pause, Placement, SECOND_ENDS, Scheduling, Scratch, interrupted, settle,
+    Cell, Child, End, Failure, GRACE, OrFail, Pause, Placement, SECOND_ENDS, Scheduling, Scratch, interrupted, settle,
 };
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -70,9 +70,8 @@ impl ForeignChild {
         folder: &Path,
         (end, placement, scheduling): (End, Placement, Scheduling),
     ) -> Result<Self, Failure> {
-        let failed = |error| Failure::of(name, error);
-        let (input, goes_on) = std::io::pipe().map_err(failed)?;
-        let create = |kind| File::create(said(folder, name, kind)).map_err(failed);
+        let (input, goes_on) = std::io::pipe().or_fail(name)?;
+        let create = |kind| File::create(said(folder, name, kind)).or_fail(name);
         command.stdin(input).stdout(create("out")?).stderr(create("err")?);
         let child = Child::start(|| {
             settle(end, placement, scheduling)?;
@@ -135,19 +134,15 @@ fn meet_until_one_ends(children: &mut [ForeignChild], deadline: Instant) -> Resu
     Ok(())
 }
 
-/// Times two programs, one at each end. Gives their round trips, µs.
+/// Times a program with itself, one at each end. Gives their round trips, µs.
 ///
 /// # Errors
 /// What either failed with, the one that ended first.
-pub fn time_two_programs(
-    cell: &Cell,
-    scratch: &Scratch,
-    program: impl Fn(End) -> ForeignProgram,
-) -> Result<Vec<f64>, Failure> {
+pub fn time_two_programs(cell: &Cell, scratch: &Scratch, program: &ForeignProgram) -> Result<Vec<f64>, Failure> {
     let folder = scratch.directory();
     let start = |end| {
         let name = if end == End::Ping { "ping" } else { "pong" };
-        let command = program(end).command(end, cell, &folder.join("samples"));
+        let command = program.command(end, cell, &folder.join("samples"));
         ForeignChild::start(command, name, &folder, (end, cell.placement, cell.scheduling))
     };
     let mut children = [start(End::Pong)?, start(End::Ping)?];
@@ -181,7 +176,7 @@ fn said(folder: &Path, name: &str, kind: &str) -> PathBuf {
 }
 
 fn round_trips(folder: &Path) -> Result<Vec<f64>, Failure> {
-    let bytes = fs::read(folder.join("samples")).map_err(|error| Failure::of("the file of samples", error))?;
+    let bytes = fs::read(folder.join("samples")).or_fail("the file of samples")?;
     let (samples, rest) = bytes.as_chunks::<8>();
     if !rest.is_empty() {
         return Err(Failure::Failed(format!("the file of samples has {} bytes, not eight each", bytes.len())));

@@ -3,7 +3,7 @@
 //! Their sources stand in `benches/languages`; how they talk to the bench, [`crate::foreign::ForeignProgram`] says.
 
 use crate::foreign::ForeignProgram;
-use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::harness::{Failure, OrFail};
 use rohrpost_bench_local::settings::Settings;
 use std::ffi::OsString;
 use std::fs;
@@ -80,7 +80,7 @@ impl Interpreter {
     fn says(&self, script: &str) -> Result<Result<String, String>, Failure> {
         let mut command = Command::new(&self.program);
         command.args(["-B", "-c", script]).envs(self.variables());
-        let output = command.output().map_err(|error| Failure::of(&self.program.display().to_string(), error))?;
+        let output = command.output().or_fail(&self.program.display().to_string())?;
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
         if output.status.success() {
             return Ok(Ok(text(&output.stdout)));
@@ -94,7 +94,7 @@ impl Interpreter {
 /// # Errors
 /// [`Failure::Skipped`] without a compiler or the library; else what the compiler said.
 pub fn compile_c() -> Result<PathBuf, Failure> {
-    let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+    let own = std::env::current_exe().or_fail("this program")?;
     let folder = own.parent().unwrap_or(Path::new("."));
     // Cargo puts what it makes for tests into `deps` alone.
     let places = [folder.to_owned(), folder.join("deps")];
@@ -112,7 +112,7 @@ pub fn compile_c() -> Result<PathBuf, Failure> {
     if !output.status.success() {
         return Err(Failure::of("cc", String::from_utf8_lossy(&output.stderr)));
     }
-    fs::rename(&new, &program).map_err(|error| Failure::of(C_PROGRAM, error))?;
+    fs::rename(&new, &program).or_fail(C_PROGRAM)?;
     Ok(program)
 }
 

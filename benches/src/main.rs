@@ -98,7 +98,7 @@ fn main() -> ExitCode {
 }
 
 /// False when a contender failed.
-fn measure(arguments: &Run, cases: &[Box<dyn Case>]) -> Result<bool, Failure> {
+fn measure(arguments: &Run, cases: &[Case]) -> Result<bool, Failure> {
     run(arguments, &settings(arguments), cases)
 }
 
@@ -115,7 +115,7 @@ fn settings(arguments: &Run) -> Settings {
     Settings { rounds, only, quick: arguments.quick, rohrpost, ..Settings::default() }
 }
 
-fn run(arguments: &Run, settings: &Settings, cases: &[Box<dyn Case>]) -> Result<bool, Failure> {
+fn run(arguments: &Run, settings: &Settings, cases: &[Case]) -> Result<bool, Failure> {
     let say = |text: String| writeln!(io::stdout(), "{text}").is_ok();
     Ok(report::run(settings, cases, arguments.json, say)?.is_sound())
 }

@@ -1,7 +1,7 @@
 //! A module that does nothing but answer: what commands are measured with. It is this program again, in a process of
 //! its own.
 
-use rohrpost_bench_local::harness::{Child, End, Failure, Placement, Scheduling, settle};
+use rohrpost_bench_local::harness::{Child, End, Failure, OrFail, Placement, Scheduling, settle};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, node_directory};
 use rohrpost_modules::call::Caller;
@@ -36,7 +36,7 @@ const ROLE: &str = "ROHRPOST_BENCH_MODULE";
 pub fn start_motor(folder: &Path, config: &Path, placement: Placement) -> Result<Child, Failure> {
     Child::start(|| {
         settle(End::Pong, placement, Scheduling::Fifo)?;
-        let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+        let own = std::env::current_exe().or_fail("this program")?;
         let error = Command::new(own)
             .arg("--config")
             .arg(config)
@@ -81,7 +81,7 @@ pub fn reach_motor(folder: &Path, config: &Path) -> Result<(Arc<Node>, MotorProx
 pub(crate) fn run_hidden_module() -> Option<Result<(), Failure>> {
     std::env::var_os(ROLE)?;
     let ended = Start::from_environment().and_then(run_started::<CommandedMotor>);
-    Some(ended.map_err(|error| Failure::of("the module", error)))
+    Some(ended.or_fail("the module"))
 }
 
 /// Does nothing else.

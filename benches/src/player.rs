@@ -4,7 +4,9 @@
 
 use crate::foreign::ForeignProgram;
 use nix::sys::signal::{Signal, raise};
-use rohrpost_bench_local::harness::{Cell, Failure, Pause, Placement, SAMPLES_MIN, Scheduling, check_echo, fill};
+use rohrpost_bench_local::harness::{
+    Cell, Failure, OrFail, Pause, Placement, SAMPLES_MIN, Scheduling, check_echo, fill,
+};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_modules::runtime::{Context, Rate, Received, Start, Subscription, run_started};
 use rohrpost_modules::{Module, ModuleError, NoSettings};
@@ -34,7 +36,7 @@ struct PlayerTurn {
 /// # Errors
 /// When this program does not know where it is.
 pub fn player(folder: &Path, config: &Path) -> Result<ForeignProgram, Failure> {
-    let program = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+    let program = std::env::current_exe().or_fail("this program")?;
     let environment = vec![(ROLE, "".into()), ("ROHRPOST_DIR", folder.into())];
     Ok(ForeignProgram { program, first: Vec::new(), last: vec![config.into()], environment })
 }
@@ -49,7 +51,7 @@ fn run(arguments: &[String]) -> Result<(), Failure> {
     let [end, bytes, messages, warm_up, pause_ns, cap_ms, samples, config] = arguments else {
         return Err(Failure::Failed(format!("eight arguments, not {}", arguments.len())));
     };
-    let number = |text: &String| text.parse::<usize>().map_err(|error| Failure::of(text, error));
+    let number = |text: &String| text.parse::<usize>().or_fail(text);
     let is_ping = end == "ping";
     let cell = Cell {
         bytes: number(bytes)?,
@@ -64,7 +66,7 @@ fn run(arguments: &[String]) -> Result<(), Failure> {
     let name = if is_ping { "player.0" } else { "player.1" };
     let arguments = ["--config", config, "--name", name].map(String::from);
     let ended = Start::from_arguments(arguments.into_iter()).and_then(run_started::<BallPlayer>);
-    ended.map_err(|error| Failure::of("the module", error))
+    ended.or_fail("the module")
 }
 
 /// Plays.

@@ -7,7 +7,7 @@ mod support;
 use rohrpost_testbed::report::has_two_processors;
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
-use support::{bench, children, interrupt, left_behind, rows, run, wait_for};
+use support::{begin, interrupt, left_behind, rows, run};
 
 const CBWARE: &str = "CBWare, its table";
 
@@ -88,12 +88,7 @@ fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
 #[test]
 fn an_interrupt_leaves_no_process_and_no_network() {
     let before = network();
-    let child = bench("lan", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
-    let mut pids = Vec::new();
-    wait_for("a turn", || {
-        pids = children(&child);
-        pids.len() > 2
-    });
+    let (child, pids) = begin("lan", "hop", |_, processes| processes > 2);
     interrupt(child, &pids);
     assert_eq!(network(), before);
 }

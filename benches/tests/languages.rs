@@ -7,7 +7,7 @@ mod support;
 
 use rohrpost_testbed::report::has_two_processors;
 use serde_json::{Map, Value};
-use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
+use support::{FAILED, begin, interrupt, left_behind, rows, run};
 
 /// Case and contender; what the last one says when it could not run here is reported by `rows`.
 const ROWS: [(&str, &str); 15] = [
@@ -75,12 +75,7 @@ fn an_interrupt_leaves_no_process() {
     if !has_two_processors() {
         return;
     }
-    let child = bench("languages", &["--only", "remote", "--rounds", "1000"]).spawn().unwrap();
-    let mut pids = Vec::new();
     // Systems, the module, and programs in Python.
-    wait_for("a turn", || {
-        pids = children(&child);
-        pids.len() > 2
-    });
+    let (child, pids) = begin("languages", "remote", |_, processes| processes > 2);
     interrupt(child, &pids);
 }

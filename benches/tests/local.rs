@@ -8,7 +8,7 @@ mod support;
 use nix::sys::signal::Signal;
 use rohrpost_testbed::report::has_two_processors;
 use std::process::Child;
-use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
+use support::{are_gone, begin, end, interrupt, left_behind, prefix, rows, run, wait_for};
 
 /// The latency cases: sizes, and the contenders besides ours.
 const CASES: [(&str, &[u64], &[&str]); 8] = [
@@ -59,33 +59,24 @@ fn a_case_that_is_none_is_refused() {
     assert!(!output.status.success() && said.contains("`no-such-case`") && said.contains("one-core"), "{said}");
 }
 
-/// Starts a run and waits until it has made something in shared memory.
-fn begun() -> (Child, String) {
-    let child = bench("local", &["--only", "blocking", "--rounds", "1000"]).spawn().unwrap();
-    let prefix = prefix(&child);
-    wait_for("a turn to begin", || left_behind(&prefix).len() > 1 || !children(&child).is_empty());
-    wait_for("something in shared memory", || !left_behind(&prefix).is_empty());
-    (child, prefix)
+/// A run whose turn has begun, and has made something in shared memory.
+fn begun() -> (Child, Vec<String>) {
+    let (child, pids) = begin("local", "blocking", |_, processes| processes == 2);
+    wait_for("something in shared memory", || !left_behind(&prefix(&child)).is_empty());
+    (child, pids)
 }
 
 #[test]
 fn an_interrupt_leaves_nothing() {
-    let (child, _) = begun();
-    let pids = children(&child);
+    let (child, pids) = begun();
     interrupt(child, &pids);
 }
 
 #[test]
 fn what_a_killed_run_left_goes_with_the_next_one() {
-    let (mut child, prefix) = begun();
-    let mut pids = Vec::new();
-    wait_for("both ends", || {
-        pids = children(&child);
-        pids.len() == 2
-    });
-    signal(&child, Signal::SIGKILL);
-    child.wait().unwrap();
+    let (mut child, pids) = begun();
+    end(&mut child, Signal::SIGKILL);
     wait_for("the processes to end", || are_gone(&pids));
     assert!(run("local", &["--quick", "--only", "one-core"]).0.status.success());
-    assert_eq!(left_behind(&prefix), [""; 0]);
+    assert_eq!(left_behind(&prefix(&child)), [""; 0]);
 }

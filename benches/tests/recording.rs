@@ -7,7 +7,8 @@ mod support;
 
 use nix::sys::signal::Signal;
 use rohrpost_testbed::report::has_two_processors;
-use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
+use std::process::Child;
+use support::{are_gone, begin, end, interrupt, left_behind, prefix, rows, run, wait_for};
 
 const SIZES: [u64; 4] = [100, 1000, 62_000, 4 << 20];
 
@@ -45,31 +46,24 @@ fn every_contender_records_all_and_every_line_is_complete() {
     assert_eq!(left_behind(&prefix), [""; 0]);
 }
 
-/// What one turn needs: its process, and the folder with the recording.
-fn a_turn(child: &std::process::Child) -> Vec<String> {
-    let mut pids = Vec::new();
-    wait_for("a turn", || {
-        pids = children(child);
-        pids.len() == 1 && !left_behind(&prefix(child)).is_empty()
-    });
-    pids
+/// A run whose turn has what it needs: its process, and the folder with the recording.
+fn begun() -> (Child, Vec<String>) {
+    let (child, pids) = begin("recording", "recorded", |_, processes| processes == 1);
+    wait_for("its folder", || !left_behind(&prefix(&child)).is_empty());
+    (child, pids)
 }
 
 #[test]
 fn an_interrupt_leaves_nothing() {
-    let child = bench("recording", &["--rounds", "1000"]).spawn().unwrap();
-    let (pids, prefix) = (a_turn(&child), prefix(&child));
+    let (child, pids) = begun();
     interrupt(child, &pids);
-    assert_eq!(left_behind(&prefix), [""; 0]);
 }
 
 #[test]
 fn what_a_killed_run_left_goes_with_the_next_one() {
-    let mut child = bench("recording", &["--rounds", "1000"]).spawn().unwrap();
-    let (pids, prefix) = (a_turn(&child), prefix(&child));
-    signal(&child, Signal::SIGKILL);
-    child.wait().unwrap();
-    wait_for("the process to end", || are_gone(&pids));
+    let (mut child, pids) = begun();
+    end(&mut child, Signal::SIGKILL);
+    wait_for("the processes to end", || are_gone(&pids));
     assert!(run("recording", &["--quick", "--only", "processor"]).0.status.success());
-    assert_eq!(left_behind(&prefix), [""; 0]);
+    assert_eq!(left_behind(&prefix(&child)), [""; 0]);
 }

@@ -7,7 +7,7 @@ mod support;
 
 use nix::sys::signal::Signal;
 use rohrpost_testbed::report::has_two_processors;
-use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
+use support::{are_gone, begin, end, interrupt, left_behind, prefix, rows, run, wait_for};
 
 /// Case, bytes of a record, contenders that ours is compared with, and others.
 type Rows = (&'static str, Option<u64>, &'static [&'static str], &'static [&'static str]);
@@ -53,27 +53,18 @@ fn every_contender_delivers_and_every_line_is_complete() {
 
 #[test]
 fn an_interrupt_leaves_nothing() {
-    let child = bench("streams", &["--only", "cost-of-write", "--rounds", "1000"]).spawn().unwrap();
-    let mut pids = Vec::new();
     // The writer, and eight readers.
-    wait_for("a turn", || {
-        pids = children(&child);
-        pids.len() == 9
-    });
+    let (child, pids) = begin("streams", "cost-of-write", |_, processes| processes == 9);
     interrupt(child, &pids);
 }
 
 #[test]
 fn what_a_killed_run_left_goes_with_the_next_one() {
-    let mut child = bench("streams", &["--only", "blocking", "--rounds", "1000"]).spawn().unwrap();
-    let (prefix, mut pids) = (prefix(&child), Vec::new());
-    wait_for("both ends", || {
-        pids = children(&child);
-        pids.len() == 2 && !left_behind(&prefix).is_empty()
-    });
-    signal(&child, Signal::SIGKILL);
-    child.wait().unwrap();
+    let (mut child, pids) = begin("streams", "blocking", |_, processes| processes == 2);
+    wait_for("something in shared memory", || !left_behind(&prefix(&child)).is_empty());
+    end(&mut child, Signal::SIGKILL);
     wait_for("the processes to end", || are_gone(&pids));
+    let prefix = prefix(&child);
     assert!(run("streams", &["--quick", "--only", "rate"]).0.status.success());
     assert_eq!(left_behind(&prefix), [""; 0]);
 }

@@ -6,7 +6,7 @@ mod support;
 
 use rohrpost_testbed::report::has_two_processors;
 use serde_json::{Map, Value};
-use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
+use support::{FAILED, begin, interrupt, left_behind, rows, run};
 
 /// A row that exists whenever its case could run: case and contender.
 const ROWS: [(&str, &str); 18] = [
@@ -57,12 +57,7 @@ fn every_case_runs_and_every_line_is_complete() {
 
 #[test]
 fn an_interrupt_leaves_no_process() {
-    let child = bench("tcp", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
-    let mut pids = Vec::new();
     // Systems, relays and modules.
-    wait_for("a turn", || {
-        pids = children(&child);
-        pids.len() > 2
-    });
+    let (child, pids) = begin("tcp", "hop", |_, processes| processes > 2);
     interrupt(child, &pids);
 }

@@ -6,7 +6,8 @@ mod support;
 
 use rohrpost_testbed::report;
 use serde_json::{Map, Value};
-use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
+use std::process::Child;
+use support::{FAILED, begin, interrupt, left_behind, prefix, rows, run};
 
 /// A row of each case that exists whenever the case could run, and its contender.
 const ROWS: [(&str, &str); 21] = [
@@ -64,14 +65,10 @@ fn every_case_runs_and_every_line_is_complete() {
 
 #[test]
 fn an_interrupt_leaves_no_process() {
-    let mut child = bench("tdma", &["--only", "slots", "--rounds", "1000"]).spawn().unwrap();
-    let mut pids = Vec::new();
     // Routers, capture and feeders; without a command or namespaces it ends by itself.
-    wait_for("a turn", || {
-        pids = children(&child);
-        pids.len() > 2 || child.try_wait().unwrap().is_some()
-    });
-    if child.try_wait().unwrap().is_none() {
+    let has_ended = |child: &mut Child| child.try_wait().unwrap().is_some();
+    let (mut child, pids) = begin("tdma", "slots", |child, processes| processes > 2 || has_ended(child));
+    if !has_ended(&mut child) {
         interrupt(child, &pids);
     } else {
         report::skipped("benches: an interrupt of cases with time slots");

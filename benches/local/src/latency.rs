@@ -7,8 +7,9 @@ use crate::case::Case;
 use crate::hand_over::{HandOver, Lanes, Wake};
 use crate::harness::{Cell, Failure, Pause, Placement, Scheduling, Scratch, Shared, time_two_processes};
 use crate::ours::{How, Mailboxes};
-use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::rounds::{Contender, Target, at_most, compare};
 use crate::settings::Settings;
+use std::iter;
 use std::time::Duration;
 
 /// Bytes that are touched of what is sent and read in place.
@@ -82,6 +83,20 @@ impl Latency {
         self
     }
 
+    /// To be measured.
+    pub fn case(self) -> Case {
+        Case::new(self.name, self.bytes, "us", move |settings, subject| {
+            let cell = self.cell(settings);
+            let ours = Contender::sampled("rohrpost", || ours(&cell, self.how));
+            let rival = |&(rival, p50, p99): &(Rival, _, _)| {
+                let turn = move || (rival.turn)(&cell);
+                Contender::sampled(rival.name, turn).beside(p50, p99)
+            };
+            let contenders: Vec<Contender> = iter::once(ours).chain(self.rivals.iter().map(rival)).collect();
+            Ok(compare(settings, subject, &contenders))
+        })
+    }
+
     fn cell(&self, settings: &Settings) -> Cell {
         Cell {
             bytes: self.bytes,
@@ -112,14 +127,9 @@ pub fn spinning(bytes: usize) -> Latency {
 }
 
 /// The few cases that tell in seconds how this computer does: blocking and spinning beside the two floors.
-pub fn self_test(scheduling: Scheduling) -> Vec<Box<dyn Case>> {
-    let few = |case: Latency| -> Box<dyn Case> { Box::new(Latency { scheduling, messages: MESSAGES_FEW, ..case }) };
+pub fn self_test(scheduling: Scheduling) -> Vec<Case> {
+    let few = |case: Latency| Latency { scheduling, messages: MESSAGES_FEW, ..case }.case();
     [blocking(64), blocking(1024), spinning(64), spinning(1024)].map(few).into()
-}
-
-/// A target for times.
-pub fn at_most(bound: f64) -> Option<Target> {
-    Some(Target::AtMost(bound))
 }
 
 /// One turn of ours.
@@ -132,22 +142,4 @@ pub fn ours(cell: &Cell, how: How) -> Result<Vec<f64>, Failure> {
     // What is loaned is seen, from outside, by the bytes that are touched.
     let seen = Cell { bytes: if how == How::Loaned { TOUCHED } else { cell.bytes }, ..*cell };
     time_two_processes(&seen, |end, meetings| Mailboxes::open(&node, end, cell.bytes, how, meetings))
-}
-
-impl Case for Latency {
-    fn name(&self) -> String {
-        self.name.into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let cell = self.cell(settings);
-        let mut contenders = vec![Contender::sampled("rohrpost", || ours(&cell, self.how))];
-        for (rival, ..) in &self.rivals {
-            contenders.push(Contender::sampled(rival.name, || (rival.turn)(&cell)));
-        }
-        let versus: Vec<Versus> =
-            self.rivals.iter().map(|&(rival, p50, p99)| Versus { name: rival.name, p50, p99 }).collect();
-        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "us" };
-        Ok(compare(settings, &subject, &contenders, &versus))
-    }
 }

@@ -25,5 +25,5 @@ pub mod statistics;
 pub mod table;
 
 pub use case::Case;
-pub use harness::Failure;
+pub use harness::{Failure, OrFail};
 pub use settings::Settings;

@@ -1,6 +1,6 @@
 //! Rohrpost's own mailboxes, by nothing but their public interface.
 
-use crate::harness::{End, Failure, Link, Meetings};
+use crate::harness::{End, Failure, Link, Meetings, OrFail, copy_whole};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Receiver, Sender, Shape, Type, Waiting};
 use std::path::Path;
 use std::sync::Arc;
@@ -8,6 +8,28 @@ use std::time::Duration;
 
 /// How long a spinning receiver looks before it sleeps: longer than any message takes, so that it never sleeps.
 const SPIN: Duration = Duration::from_millis(100);
+
+/// A participant on the node in this directory, which is made unless it is there.
+///
+/// # Errors
+/// When it cannot be made or joined.
+pub fn join(directory: &Path, own: Name) -> Result<Arc<Participant>, Failure> {
+    let node = Node::create(directory, 0o700).or_fail("node")?;
+    Participant::join(&node, own).or_fail("node")
+}
+
+/// A mailbox for bodies of this size.
+///
+/// # Errors
+/// When no mailbox takes so much.
+pub fn shape(bytes: usize) -> Result<Shape, Failure> {
+    Ok(Shape { body_bytes_max: u16::try_from(bytes).or_fail("size of a body")?, ..Shape::default() })
+}
+
+/// The participant at an end of a ping-pong.
+pub fn name(end: End) -> Name {
+    Name::new(1, 1 + end.index() as u8, 0, 0)
+}
 
 /// How messages are sent and received.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -37,18 +59,11 @@ impl Mailboxes {
     /// # Errors
     /// When the mailboxes cannot be made.
     pub fn open(directory: &Path, end: End, bytes: usize, how: How, meetings: &mut Meetings) -> Result<Self, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::of("mailbox", error);
-        let body_bytes_max = u16::try_from(bytes).map_err(|error| failed(&error))?;
-        let (mine, other) = match end {
-            End::Ping => (Name::new(1, 1, 0, 0), Name::new(1, 2, 0, 0)),
-            End::Pong => (Name::new(1, 2, 0, 0), Name::new(1, 1, 0, 0)),
-        };
-        let node = Node::create(directory, 0o700).map_err(|error| failed(&error))?;
-        let participant = Participant::join(&node, mine).map_err(|error| failed(&error))?;
-        let shape = Shape { body_bytes_max, ..Shape::default() };
-        let receiver = participant.receiver(mine, shape).map_err(|error| failed(&error))?;
+        let [mine, other] = [end, end.other()].map(name);
+        let participant = join(directory, mine)?;
+        let receiver = participant.receiver(mine, shape(bytes)?).or_fail("mailbox")?;
         meetings.meet()?;
-        let sender = participant.sender(other).map_err(|error| failed(&error))?;
+        let sender = participant.sender(other).or_fail("mailbox")?;
         let spin = if how == How::Blocking { Duration::ZERO } else { SPIN };
         let label = Label { from: mine, kind: Type::command(16), ..Label::default() };
         Ok(Self { receiver, sender, label, how, waiting: Waiting { spin, deadline: None }, bytes })
@@ -64,7 +79,7 @@ impl Link for Mailboxes {
                 loan.send(&self.label, self.bytes)
             }),
         };
-        sent.map_err(|error| Failure::of("send", error))
+        sent.or_fail("send")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
@@ -93,12 +108,8 @@ impl Station {
     /// # Errors
     /// When the mailbox cannot be made.
     pub fn open(directory: &Path, own: Option<Name>, other: Name, bytes: usize) -> Result<Self, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::of("mailbox", error);
-        let body_bytes_max = u16::try_from(bytes).map_err(|error| failed(&error))?;
-        let node = Node::create(directory, 0o700).map_err(|error| failed(&error))?;
-        let participant = Participant::join(&node, own.unwrap_or(Name::NONE)).map_err(|error| failed(&error))?;
-        let shape = Shape { body_bytes_max, ..Shape::default() };
-        let receiver = own.map(|own| participant.receiver(own, shape)).transpose().map_err(|error| failed(&error))?;
+        let (participant, shape) = (join(directory, own.unwrap_or(Name::NONE))?, shape(bytes)?);
+        let receiver = own.map(|own| participant.receiver(own, shape)).transpose().or_fail("mailbox")?;
         Ok(Self { participant, receiver, other, sender: None })
     }
 }
@@ -107,19 +118,14 @@ impl Link for Station {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         let sender = match &mut self.sender {
             Some(sender) => sender,
-            none => none.insert(self.participant.sender(self.other).map_err(|error| Failure::of("sender", error))?),
+            none => none.insert(self.participant.sender(self.other).or_fail("sender")?),
         };
         let label = Label { kind: Type::data(0), ..Label::default() };
-        sender.send(&label, &[message]).map_err(|error| Failure::of("send", error))
+        sender.send(&label, &[message]).or_fail("send")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         let receiver = self.receiver.as_mut().ok_or_else(|| Failure::Failed("it has no mailbox".into()))?;
-        let package = receiver.receive();
-        match package.body() {
-            body if body.len() == message.len() => message.copy_from_slice(body),
-            body => return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), message.len()))),
-        }
-        Ok(())
+        copy_whole(receiver.receive().body(), message)
     }
 }

@@ -29,12 +29,7 @@ impl Report {
 ///
 /// # Errors
 /// When a word of the settings names no case, when a case cannot be begun, or after a signal.
-pub fn run(
-    settings: &Settings,
-    cases: &[Box<dyn Case>],
-    json: bool,
-    say: impl Fn(String) -> bool,
-) -> Result<Report, Failure> {
+pub fn run(settings: &Settings, cases: &[Case], json: bool, say: impl Fn(String) -> bool) -> Result<Report, Failure> {
     check_names(&settings.only, cases)?;
     harness::heed();
     harness::sweep();
@@ -43,7 +38,7 @@ pub fn run(
     let head = &report.environment;
     let mut is_read =
         say(if json { table::json_environment(head) } else { format!("{}\n", table::human_environment(head)) });
-    for case in cases.iter().filter(|case| settings.wants(&case.name())) {
+    for case in cases.iter().filter(|case| settings.wants(case.name())) {
         if !is_read {
             break;
         }
@@ -60,8 +55,8 @@ pub fn run(
 }
 
 /// Each word that was asked for must be part of a case's name.
-fn check_names(only: &[String], cases: &[Box<dyn Case>]) -> Result<(), Failure> {
-    let mut names: Vec<String> = cases.iter().map(|case| case.name()).collect();
+fn check_names(only: &[String], cases: &[Case]) -> Result<(), Failure> {
+    let mut names: Vec<&str> = cases.iter().map(Case::name).collect();
     names.dedup();
     match only.iter().find(|word| !names.iter().any(|name| name.contains(word.as_str()))) {
         None => Ok(()),

@@ -14,19 +14,47 @@ pub struct Contender<'a> {
     pub name: &'static str,
     /// One turn.
     pub turn: Box<dyn Fn() -> Result<Summary, Failure> + 'a>,
+    /// How ours is compared with it: a row for each.
+    pub versus: Vec<Versus>,
 }
 
 impl<'a> Contender<'a> {
+    /// A contender that ours is not compared with.
+    pub fn new(name: &'static str, turn: impl Fn() -> Result<Summary, Failure> + 'a) -> Self {
+        Self { name, turn: Box::new(turn), versus: Vec::new() }
+    }
+
     /// A contender with turns of samples, of which the quantiles count.
     pub fn sampled(name: &'static str, turn: impl Fn() -> Result<Vec<f64>, Failure> + 'a) -> Self {
-        let turn = move || Summary::of(&mut turn()?).ok_or_else(|| Failure::Failed("not one sample".into()));
-        Self { name, turn: Box::new(turn) }
+        Self::new(name, move || Summary::of(&mut turn()?).ok_or_else(|| Failure::Failed("not one sample".into())))
     }
 
     /// A contender with turns of one figure each, a rate say.
     pub fn single(name: &'static str, turn: impl Fn() -> Result<f64, Failure> + 'a) -> Self {
-        Self { name, turn: Box::new(move || Ok(Summary::single(turn()?))) }
+        Self::new(name, move || turn().map(Summary::single))
     }
+
+    /// Figures that are known beforehand: a limit, or what others have measured.
+    pub fn fixed(name: &'static str, figures: Summary) -> Self {
+        Self::new(name, move || Ok(figures))
+    }
+
+    /// Ours stands beside this one, with targets for the ratios of the medians and of the 99 % quantiles.
+    #[must_use]
+    pub fn beside(mut self, p50: Option<Target>, p99: Option<Target>) -> Self {
+        self.versus.push(Versus { name: self.name, p50, p99 });
+        self
+    }
+}
+
+/// A target for times and sizes.
+pub fn at_most(bound: f64) -> Option<Target> {
+    Some(Target::AtMost(bound))
+}
+
+/// A target for rates.
+pub fn at_least(bound: f64) -> Option<Target> {
+    Some(Target::AtLeast(bound))
 }
 
 /// The target, as a ratio to another contender.
@@ -126,27 +154,25 @@ pub struct Subject {
     pub unit: &'static str,
 }
 
-/// Measures all contenders, interleaved, and compares the first one, which is ours, with each of `versus`. Rows: ours,
-/// once for each comparison (once without, if there is none), then the others.
-pub fn compare(settings: &Settings, subject: &Subject, contenders: &[Contender], versus: &[Versus]) -> Vec<Row> {
+/// Measures all contenders, interleaved, and compares the first one, which is ours, with those that it stands beside.
+/// Rows: ours, once for each comparison (once without, if there is none), then the others.
+pub fn compare(settings: &Settings, subject: &Subject, contenders: &[Contender]) -> Vec<Row> {
     let turns = interleave(settings, contenders);
-    let row = |at: usize, versus: Option<&Versus>| {
-        let of = |name| contenders.iter().position(|contender| contender.name == name).map(|at| turns[at].as_slice());
-        let other = versus.and_then(|versus| of(versus.name)).unwrap_or_default();
-        Row {
-            case: subject.case.clone(),
-            bytes: subject.bytes,
-            contender: contenders[at].name,
-            unit: subject.unit,
-            result: over_rounds(&turns[at]),
-            versus: versus.copied(),
-            ratio_p50: ratio(&turns[at], other, |summary| Some(summary.p50)),
-            ratio_p99: ratio(&turns[at], other, |summary| summary.p99),
-        }
-    };
-    let ours = versus.iter().map(Some).chain(versus.is_empty().then_some(None)).map(|versus| row(0, versus));
-    let others = (1..contenders.len()).map(|at| row(at, None));
-    ours.chain(others).collect()
+    let row = |at: usize| Row::alone(subject.clone(), contenders[at].name, over_rounds(&turns[at]));
+    let mut rows = Vec::new();
+    for (other, turns_of_other) in contenders.iter().zip(&turns) {
+        rows.extend(other.versus.iter().map(|versus| Row {
+            versus: Some(*versus),
+            ratio_p50: ratio(&turns[0], turns_of_other, |summary| Some(summary.p50)),
+            ratio_p99: ratio(&turns[0], turns_of_other, |summary| summary.p99),
+            ..row(0)
+        }));
+    }
+    if rows.is_empty() {
+        rows.push(row(0));
+    }
+    rows.extend((1..contenders.len()).map(row));
+    rows
 }
 
 type Turns = Vec<Result<Summary, Failure>>;
@@ -223,7 +249,7 @@ mod tests {
                 order.borrow_mut().push_str(name);
                 if name == "c" { Err(Failure::Failed("once".into())) } else { Ok(Summary::single(1.0)) }
             };
-            Contender { name, turn: Box::new(turn) }
+            Contender::new(name, turn)
         };
         let settings = Settings { rounds: 4, ..Settings::default() };
         let turns = interleave(&settings, &["a", "b", "c"].map(contender));

@@ -1,6 +1,6 @@
 //! How much is measured.
 
-use crate::harness::Failure;
+use crate::harness::{Failure, OrFail};
 use std::path::PathBuf;
 
 /// How much a run measures. All cases obey it.
@@ -42,7 +42,7 @@ impl Settings {
     /// # Errors
     /// [`Failure::Skipped`] when there is none.
     pub fn command(&self) -> Result<PathBuf, Failure> {
-        let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+        let own = std::env::current_exe().or_fail("this program")?;
         let path = self.rohrpost.clone().unwrap_or(own.with_file_name("rohrpost"));
         if path.is_file() {
             return Ok(path);

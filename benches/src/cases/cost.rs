@@ -11,8 +11,7 @@ use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
     Child, CycleCounter, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle,
 };
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::rounds::{Contender, Versus, at_most, compare};
 use rohrpost_mailbox::{OverflowPolicy, monotonic_ns};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -26,41 +25,34 @@ const PAUSE_NS: u64 = 400;
 const PATIENCE: Duration = Duration::from_secs(15);
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     // The floor of one send includes what any queue with a sleeping receiver needs; the floor of many is the bare
     // queue.
-    let single = Versus { name: "Vyukov, wakeable", p50: Some(Target::AtMost(1.3)), p99: None };
-    let many = Versus { name: "Vyukov", p50: Some(Target::AtMost(2.0)), p99: None };
-    vec![Box::new(Cost { burst: 1, versus: single }), Box::new(Cost { burst: 16, versus: many })]
+    vec![case(1, 0, 1.3), case(16, 1, 2.0)]
 }
 
-struct Cost {
-    /// Packages sent in a row.
-    burst: usize,
-    versus: Versus,
-}
-
-impl Case for Cost {
-    fn name(&self) -> String {
-        format!("cost-of-{}", self.burst)
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let bursts = settings.count(32_000) / self.burst + GROUP;
+/// So many packages sent in a row, beside one of the floors.
+fn case(burst: usize, floor: usize, bound: f64) -> Case {
+    Case::new(format!("cost-of-{burst}"), BYTES, "ns", move |settings, subject| {
+        let bursts = settings.count(32_000) / burst + GROUP;
         let ours = Contender::sampled("rohrpost", || {
             let ground = OwnNode::new(DEPTH, BYTES, OverflowPolicy::Displace)?;
-            cost(self.burst, bursts, || ground.sink(100, Retry::Never), || ground.source(true))
+            cost(burst, bursts, || ground.sink(100, Retry::Never), || ground.source(true))
         });
-        let wakeable = Contender::sampled("Vyukov, wakeable", || vyukov::<true>(self.burst, bursts));
-        let bare = Contender::sampled("Vyukov", || vyukov::<false>(self.burst, bursts));
+        let mut floors = [
+            Contender::sampled("Vyukov, wakeable", || vyukov::<true>(burst, bursts)),
+            Contender::sampled("Vyukov", || vyukov::<false>(burst, bursts)),
+        ];
+        let versus = floors[floor].name;
+        floors[floor].versus.push(Versus { name: versus, p50: at_most(bound), p99: None });
+        let [wakeable, bare] = floors;
         let core = Contender::sampled("slot core", || {
             let memory = Shared::<SlotMemory>::new()?;
             let source = || Ok(SlotReceiver::new(&memory, BYTES));
-            cost(self.burst, bursts, || Ok(SlotSender::new(&memory, BYTES, 100)), source)
+            cost(burst, bursts, || Ok(SlotSender::new(&memory, BYTES, 100)), source)
         });
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "ns" };
-        Ok(compare(settings, &subject, &[ours, wakeable, bare, core], &[self.versus]))
-    }
+        Ok(compare(settings, subject, &[ours, wakeable, bare, core]))
+    })
 }
 
 fn vyukov<const FENCED: bool>(burst: usize, bursts: usize) -> Result<Vec<f64>, Failure> {

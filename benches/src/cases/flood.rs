@@ -10,13 +10,13 @@
 //! Only what was sent while the mailbox was full counts: from before the send until it has been copied out.
 
 use crate::floors::ring::DEPTH;
-use crate::floors::{Queue, TwoRings, TwoRingsReceiver, TwoRingsSender};
-use crate::one_way::{OwnNode, QueueSink, Retry, Sink, Source};
+use crate::floors::{Queue, QueueSink, TwoRings, TwoRingsReceiver, TwoRingsSender};
+use crate::one_way::{OwnNode, Retry, Sink, Source};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
     Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle,
 };
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{OverflowPolicy, monotonic_ns, sys};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -39,64 +39,46 @@ const ORDINARY: u64 = 0;
 const LAST: u64 = u64::MAX;
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Flood)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("flood", BYTES, "us", measure)]
 }
 
-struct Flood;
-
-impl Case for Flood {
-    fn name(&self) -> String {
-        "flood".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let urgent = settings.count(1_000);
-        // Where the urgent can be refused, as they are by no means under `displace` and `latest`, their sender tries
-        // again.
-        let ours = |full, states, room: Option<u64>| {
-            move || {
-                let ground = OwnNode::new(DEPTH, BYTES, full)?;
-                let low = || Ok(ground.sink(LOW, Retry::Sleep(REFUSED))?.with_states(states));
-                let high = || {
-                    Ok(ground
-                        .sink(URGENT, if room.is_some() { Retry::Spin(64) } else { Retry::Never })?
-                        .with_commands())
-                };
-                flood(urgent, room, high, low, || ground.source(false))
-            }
-        };
-        let two_rings = Contender::sampled("two rings", || {
-            let rings = Shared::<TwoRings>::new()?;
-            let sink = |urgent| Ok(TwoRingsSender::new(&rings, urgent));
-            flood(urgent, None, || sink(true), || sink(false), || Ok(TwoRingsReceiver::new(&rings)))
-        });
-        let queue = |priority: u32| {
-            move || {
-                let queue = Queue::new(DEPTH, BYTES)?;
-                let sink = |priority| Ok(QueueSink::new(&queue, priority));
-                flood(urgent, None, || sink(priority), || sink(0), || Ok(&queue))
-            }
-        };
-        let contenders = [
-            Contender::sampled("rohrpost", ours(OverflowPolicy::Displace, 1, None)),
-            two_rings,
-            Contender::sampled("posix-mq", queue(1)),
-            Contender::sampled("rohrpost, latest", ours(OverflowPolicy::Latest, 2 * DEPTH as u16, None)),
-            // A contender that rejects packages has no room for urgent ones unless the flooder leaves some.
-            Contender::sampled(
-                "rohrpost, reject, 8 left free",
-                ours(OverflowPolicy::Reject, 1, Some(DEPTH as u64 - 8)),
-            ),
-            Contender::sampled("posix-mq, one priority", queue(0)),
-        ];
-        let versus = [
-            Versus { name: "two rings", p50: Some(Target::AtMost(1.5)), p99: None },
-            Versus { name: "posix-mq", p50: None, p99: Some(Target::AtMost(1.5)) },
-        ];
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
-        Ok(compare(settings, &subject, &contenders, &versus))
-    }
+fn measure(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let urgent = settings.count(1_000);
+    // Where the urgent can be refused, as they are by no means under `displace` and `latest`, their sender tries
+    // again.
+    let ours = |full, states, room: Option<u64>| {
+        move || {
+            let ground = OwnNode::new(DEPTH, BYTES, full)?;
+            let low = || Ok(ground.sink(LOW, Retry::Sleep(REFUSED))?.with_states(states));
+            let high = || {
+                Ok(ground.sink(URGENT, if room.is_some() { Retry::Spin(64) } else { Retry::Never })?.with_commands())
+            };
+            flood(urgent, room, high, low, || ground.source(false))
+        }
+    };
+    let two_rings = Contender::sampled("two rings", || {
+        let rings = Shared::<TwoRings>::new()?;
+        let sink = |urgent| Ok(TwoRingsSender::new(&rings, urgent));
+        flood(urgent, None, || sink(true), || sink(false), || Ok(TwoRingsReceiver::new(&rings)))
+    });
+    let queue = |priority: u32| {
+        move || {
+            let queue = Queue::new(DEPTH, BYTES)?;
+            let sink = |priority| Ok(QueueSink::new(&queue, priority));
+            flood(urgent, None, || sink(priority), || sink(0), || Ok(&queue))
+        }
+    };
+    let contenders = [
+        Contender::sampled("rohrpost", ours(OverflowPolicy::Displace, 1, None)),
+        two_rings.beside(at_most(1.5), None),
+        Contender::sampled("posix-mq", queue(1)).beside(None, at_most(1.5)),
+        Contender::sampled("rohrpost, latest", ours(OverflowPolicy::Latest, 2 * DEPTH as u16, None)),
+        // A contender that rejects packages has no room for urgent ones unless the flooder leaves some.
+        Contender::sampled("rohrpost, reject, 8 left free", ours(OverflowPolicy::Reject, 1, Some(DEPTH as u64 - 8))),
+        Contender::sampled("posix-mq, one priority", queue(0)),
+    ];
+    Ok(compare(settings, subject, &contenders))
 }
 
 #[repr(C)]

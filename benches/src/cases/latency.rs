@@ -6,8 +6,9 @@ use super::rivals::{
 };
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Pause, Placement, Scheduling};
-use rohrpost_bench_local::latency::{self, FUTEX, Latency, SPIN, at_most};
+use rohrpost_bench_local::latency::{self, FUTEX, Latency, SPIN};
 use rohrpost_bench_local::ours::How;
+use rohrpost_bench_local::rounds::at_most;
 use std::time::Duration;
 
 /// With a package each 0.5 ms there is time for fewer round trips.
@@ -17,9 +18,9 @@ const MESSAGES_PACED: usize = 1_500;
 const PACE: Duration = Duration::from_micros(500);
 
 /// All of them.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     let groups = [blocking(), one_core(), spinning(), loaned(), normal_scheduler(), paced()];
-    groups.into_iter().flatten().map(|case| Box::new(case) as Box<dyn Case>).collect()
+    groups.into_iter().flatten().map(Latency::case).collect()
 }
 
 fn blocking() -> Vec<Latency> {

@@ -4,8 +4,8 @@
 
 use super::errors::{Done, as_failure};
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{End, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Shape, Type, monotonic_ns, node_directory};
@@ -20,9 +20,12 @@ const LISTINGS: usize = 11;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// All of them.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     let what = [MailboxAction::FirstSend, MailboxAction::Survey, MailboxAction::List];
-    what.map(|what| -> Box<dyn Case> { Box::new(what) }).into_iter().collect()
+    what.map(|what| {
+        Case::new(what.name(), BODY.len(), "us", move |settings, subject| Ok(what.measure(settings, subject)))
+    })
+    .into()
 }
 
 /// What is done with the mailboxes.
@@ -37,6 +40,14 @@ enum MailboxAction {
 }
 
 impl MailboxAction {
+    fn name(self) -> &'static str {
+        match self {
+            Self::FirstSend => "many-first-send",
+            Self::Survey => "many-survey",
+            Self::List => "many-list",
+        }
+    }
+
     fn limit(self) -> (&'static str, f64) {
         match self {
             Self::FirstSend => ("100 us", 100.0),
@@ -60,30 +71,14 @@ impl MailboxAction {
         all_ns.into_iter().for_each(|ns| samples.push(ns as f64 / 1000.0));
         Ok(())
     }
-}
 
-impl Case for MailboxAction {
-    fn name(&self) -> String {
-        match self {
-            Self::FirstSend => "many-first-send",
-            Self::Survey => "many-survey",
-            Self::List => "many-list",
-        }
-        .into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+    fn measure(self, settings: &Settings, subject: &Subject) -> Vec<Row> {
         let ours = Contender::sampled("rohrpost", || {
             sample_in_child(PATIENCE, |samples| self.turn(settings, samples).map_err(as_failure("many mailboxes")))
         });
         let (name, limit_us) = self.limit();
-        let limit = Contender {
-            name,
-            turn: Box::new(move || Ok(Summary { p99: Some(limit_us), ..Summary::single(limit_us) })),
-        };
-        let subject = Subject { case: self.name(), bytes: Some(BODY.len()), unit: "us" };
-        let target = Some(Target::AtMost(1.0));
-        Ok(compare(settings, &subject, &[ours, limit], &[Versus { name, p50: target, p99: target }]))
+        let limit = Contender::fixed(name, Summary { p99: Some(limit_us), ..Summary::single(limit_us) });
+        compare(settings, subject, &[ours, limit.beside(at_most(1.0), at_most(1.0))])
     }
 }
 

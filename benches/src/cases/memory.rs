@@ -2,8 +2,8 @@
 
 use crate::one_way::OwnNode;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::Failure;
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{Failure, OrFail};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::OverflowPolicy;
@@ -17,9 +17,16 @@ const LINE: usize = 64;
 const BLOCK: u64 = 512;
 
 /// All of them: small and large, few slots and many.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     let shapes = [(1, 64), (8, 64), (32, 1024), (64, 64), (65, 64), (64, 16_384), (256, 256), (1024, 64), (1024, 4096)];
-    shapes.map(|(slots, bytes)| -> Box<dyn Case> { Box::new(MemoryCase { slots, bytes }) }).into_iter().collect()
+    shapes
+        .map(|(slots, bytes)| {
+            let shape = MemoryCase { slots, bytes };
+            Case::new(format!("memory-{slots}-slots"), bytes, "B", move |settings, subject| {
+                Ok(shape.measure(settings, subject))
+            })
+        })
+        .into()
 }
 
 struct MemoryCase {
@@ -38,35 +45,25 @@ impl MemoryCase {
     fn taken_bytes(&self) -> Result<u64, Failure> {
         let ground = OwnNode::new(self.slots, self.bytes, OverflowPolicy::Displace)?;
         let _source = ground.source(false)?;
-        let files = std::fs::read_dir(ground.path()).map_err(|error| Failure::of("node's directory", error))?;
+        let files = std::fs::read_dir(ground.path()).or_fail("node's directory")?;
         let sizes = files.filter_map(|file| {
             let file = file.ok()?;
             file.path().extension().is_some_and(|extension| extension == "mbx").then(|| file.metadata())
         });
-        let sizes: Vec<_> = sizes.collect::<Result<_, _>>().map_err(|error| Failure::of("mailbox's file", error))?;
+        let sizes: Vec<_> = sizes.collect::<Result<_, _>>().or_fail("mailbox's file")?;
         match sizes.as_slice() {
             [one] => Ok(one.blocks() * BLOCK),
             files => Err(Failure::Failed(format!("{} files of one mailbox", files.len()))),
         }
     }
-}
 
-impl Case for MemoryCase {
-    fn name(&self) -> String {
-        format!("memory-{}-slots", self.slots)
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ours = || Ok(Summary::single(self.taken_bytes()? as f64));
-        let bare = || Ok(Summary::single((self.slots * self.bytes) as f64));
-        let allowed = || Ok(Summary::single(self.allowed_bytes() as f64));
+    fn measure(&self, settings: &Settings, subject: &Subject) -> Vec<Row> {
+        let fixed = |name, bytes| Contender::fixed(name, Summary::single(bytes as f64));
         let contenders = [
-            Contender { name: "rohrpost", turn: Box::new(ours) },
-            Contender { name: "slots + 64 B each + a page", turn: Box::new(allowed) },
-            Contender { name: "bodies alone", turn: Box::new(bare) },
+            Contender::single("rohrpost", || Ok(self.taken_bytes()? as f64)),
+            fixed("slots + 64 B each + a page", self.allowed_bytes()).beside(at_most(1.0), None),
+            fixed("bodies alone", self.slots * self.bytes),
         ];
-        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "B" };
-        let versus = Versus { name: contenders[1].name, p50: Some(Target::AtMost(1.0)), p99: None };
-        Ok(compare(&Settings { rounds: 1, ..settings.clone() }, &subject, &contenders, &[versus]))
+        compare(&Settings { rounds: 1, ..settings.clone() }, subject, &contenders)
     }
 }

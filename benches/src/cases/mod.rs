@@ -35,7 +35,7 @@ pub fn run_hidden_program() -> Option<Result<(), Failure>> {
 }
 
 /// All cases, in the order in which they are measured.
-pub fn all() -> Vec<Box<dyn Case>> {
+pub fn all() -> Vec<Case> {
     let all = [
         latency::cases(),
         rates::cases(),

@@ -5,17 +5,16 @@
 //! counted.
 
 use crate::counting::heap_uses;
-use crate::floors::Queue;
-use crate::one_way::{OwnNode, QueueSink, Retry, Sink, Source};
+use crate::floors::{Queue, QueueSink};
+use crate::one_way::{OwnNode, Retry, Sink, Source};
 use nix::sys::ptrace;
 use nix::sys::signal::{Signal, kill, raise};
 use nix::sys::wait::{WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork};
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{Failure, sample_in_child};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{Failure, OrFail, sample_in_child};
+use rohrpost_bench_local::rounds::{Contender, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
-use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::OverflowPolicy;
 use std::hint::black_box;
 use std::sync::mpsc;
@@ -29,54 +28,40 @@ const PATIENCE: Duration = Duration::from_secs(60);
 const MARK: libc::c_long = libc::SYS_getpgrp;
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Proof::SystemCalls), Box::new(Proof::HeapUses)]
+pub(super) fn cases() -> Vec<Case> {
+    let system_calls = |batches| {
+        [
+            counted("rohrpost", move || traced(|| mailbox_under(batches, mark))),
+            counted("posix-mq", move || traced(|| queue_under(batches))),
+        ]
+    };
+    let heap_uses = |batches| {
+        [
+            counted("rohrpost", move || mailbox_heap_uses(batches)),
+            counted("channel of vectors", move || channel_heap_uses(batches)),
+        ]
+    };
+    vec![case("system-calls-per-send", system_calls), case("heap-uses-per-send", heap_uses)]
 }
 
-/// What is counted.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Proof {
-    SystemCalls,
-    HeapUses,
-}
-
-impl Case for Proof {
-    fn name(&self) -> String {
-        match self {
-            Self::SystemCalls => "system-calls-per-send",
-            Self::HeapUses => "heap-uses-per-send",
-        }
-        .into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let batches = settings.count(1_600) / BATCH + 1;
-        let [ours, other] = match self {
-            Self::SystemCalls => [
-                counted("rohrpost", move || traced(move || mailbox_under(batches, mark))),
-                counted("posix-mq", move || traced(move || queue_under(batches))),
-            ],
-            Self::HeapUses => [
-                counted("rohrpost", move || mailbox_heap_uses(batches)),
-                counted("channel of vectors", move || channel_heap_uses(batches)),
-            ],
-        };
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "a send" };
-        let versus = Versus { name: other.name, p50: Some(Target::AtMost(0.0)), p99: None };
-        Ok(compare(&Settings { rounds: 1, ..settings.clone() }, &subject, &[ours, other], &[versus]))
-    }
+/// What is counted of so many batches: ours, and another of which something is known to be counted.
+fn case(name: &str, contenders: fn(usize) -> [Contender<'static>; 2]) -> Case {
+    Case::new(name, BYTES, "a send", move |settings, subject| {
+        let [ours, other] = contenders(settings.count(1_600) / BATCH + 1);
+        let once = Settings { rounds: 1, ..settings.clone() };
+        Ok(compare(&once, subject, &[ours, other.beside(at_most(0.0), None)]))
+    })
 }
 
 /// A contender with its figure counted in a process of its own.
 fn counted<'a>(name: &'static str, count: impl Fn() -> Result<f64, Failure> + 'a) -> Contender<'a> {
-    let turn = move || {
+    Contender::single(name, move || {
         let counts = sample_in_child(PATIENCE, |samples| {
             samples.push(count()?);
             Ok(())
         })?;
-        counts.first().map(|count| Summary::single(*count)).ok_or_else(|| Failure::Failed("nothing counted".into()))
-    };
-    Contender { name, turn: Box::new(turn) }
+        counts.first().copied().ok_or_else(|| Failure::Failed("nothing counted".into()))
+    })
 }
 
 /// Sends batch after batch into a mailbox of this process, with `mark` before and after each, and receives it again.
@@ -122,7 +107,7 @@ fn channel_heap_uses(batches: usize) -> Result<f64, Failure> {
     let (sender, receiver) = mpsc::channel();
     let before = heap_uses();
     for _ in 0..batches * BATCH {
-        sender.send(black_box(vec![7u8; BYTES])).map_err(|error| Failure::of("channel", error))?;
+        sender.send(black_box(vec![7u8; BYTES])).or_fail("channel")?;
     }
     let uses = heap_uses() - before;
     drop(receiver);
@@ -140,7 +125,7 @@ fn queue_under(batches: usize) -> Result<usize, Failure> {
         }
         mark();
         for _ in 0..BATCH {
-            Source::receive(&mut source, &mut message)?;
+            source.receive(&mut message)?;
         }
     }
     Ok(batches * BATCH)
@@ -155,7 +140,7 @@ fn mark() {
 /// marks.
 fn traced(body: impl FnOnce() -> Result<usize, Failure>) -> Result<f64, Failure> {
     // SAFETY: this process has one thread.
-    match unsafe { fork() }.map_err(|error| Failure::of("fork", error))? {
+    match unsafe { fork() }.or_fail("fork")? {
         ForkResult::Child => {
             let sent = ptrace::traceme()
                 .and_then(|()| raise(Signal::SIGSTOP))

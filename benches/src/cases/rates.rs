@@ -3,12 +3,12 @@
 //! A full mailbox rejects, and its sender tries again, so nothing is lost. The rings and queues beside it make
 //! their senders wait, too.
 
-use crate::floors::Queue;
 use crate::floors::ring::{BareRing, DEPTH, Futex, RingReceiver, RingSender, SharedRing as Ring};
-use crate::one_way::{OwnNode, QueueSink, Retry, Stream, rate};
+use crate::floors::{Queue, QueueSink};
+use crate::one_way::{OwnNode, Retry, Stream, rate};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Failure, Scheduling, Shared};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_least, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::OverflowPolicy;
 use std::time::Duration;
@@ -21,9 +21,19 @@ const RETRY: Retry = Retry::Spin(64);
 const PRIORITIES: [u8; 4] = [20, 50, 80, 110];
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let one = |spins, bytes, bound| -> Box<dyn Case> { Box::new(OneSender { spins, bytes, bound }) };
-    vec![one(false, 64, 1.0), one(false, 4096, 1.0), one(true, 64, 0.25), one(true, 4096, 0.85), Box::new(FourSenders)]
+pub(super) fn cases() -> Vec<Case> {
+    let one = |spins, bytes, bound| {
+        let name = if spins { "rate-spinning" } else { "rate-blocking" };
+        let sender = OneSender { spins, bytes, bound };
+        Case::new(name, bytes, "packages/s", move |settings, subject| Ok(sender.measure(settings, subject)))
+    };
+    vec![
+        one(false, 64, 1.0),
+        one(false, 4096, 1.0),
+        one(true, 64, 0.25),
+        one(true, 4096, 0.85),
+        Case::new("rate-four-senders", 64, "packages/s", four_senders),
+    ]
 }
 
 struct OneSender {
@@ -34,12 +44,8 @@ struct OneSender {
     bound: f64,
 }
 
-impl Case for OneSender {
-    fn name(&self) -> String {
-        if self.spins { "rate-spinning" } else { "rate-blocking" }.into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+impl OneSender {
+    fn measure(&self, settings: &Settings, subject: &Subject) -> Vec<Row> {
         let stream = stream(settings, self.bytes, 1);
         let ours = Contender::single("rohrpost", || ours(&stream, self.spins, RETRY));
         let futex = Contender::single("futex ring", || {
@@ -58,16 +64,12 @@ impl Case for OneSender {
             let queue = Queue::new(DEPTH, self.bytes)?;
             rate(&stream, |_| Ok(QueueSink::new(&queue, 0)), || Ok(&queue))
         });
-        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "packages/s" };
         let floor = if self.spins { bare } else { futex };
-        let versus = [Versus { name: floor.name, p50: Some(Target::AtLeast(self.bound)), p99: None }];
-        let mut contenders = vec![ours, floor, queue];
+        let mut contenders = vec![ours, floor.beside(at_least(self.bound), None), queue];
         contenders.extend(self.peers(&stream));
-        Ok(compare(settings, &subject, &contenders, &versus))
+        compare(settings, subject, &contenders)
     }
-}
 
-impl OneSender {
     fn peers<'a>(&self, stream: &'a Stream) -> Vec<Contender<'a>> {
         use crate::one_way::{channel_rate, iceoryx_rate};
         if self.spins {
@@ -81,22 +83,12 @@ impl OneSender {
     }
 }
 
-struct FourSenders;
-
-impl Case for FourSenders {
-    fn name(&self) -> String {
-        "rate-four-senders".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let (one, four) = (stream(settings, 64, 1), stream(settings, 64, PRIORITIES.len()));
-        // All senders share a processor: a refused sender yields to the others.
-        let four = Contender::single("rohrpost", move || ours(&four, true, Retry::Yield));
-        let one = Contender::single("one sender", move || ours(&one, true, Retry::Yield));
-        let subject = Subject { case: self.name(), bytes: Some(64), unit: "packages/s" };
-        let versus = [Versus { name: one.name, p50: Some(Target::AtLeast(0.5)), p99: None }];
-        Ok(compare(settings, &subject, &[four, one], &versus))
-    }
+fn four_senders(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let (one, four) = (stream(settings, 64, 1), stream(settings, 64, PRIORITIES.len()));
+    // All senders share a processor: a refused sender yields to the others.
+    let four = Contender::single("rohrpost", move || ours(&four, true, Retry::Yield));
+    let one = Contender::single("one sender", move || ours(&one, true, Retry::Yield));
+    Ok(compare(settings, subject, &[four, one.beside(at_least(0.5), None)]))
 }
 
 fn stream(settings: &Settings, bytes: usize, senders: usize) -> Stream {

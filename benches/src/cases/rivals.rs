@@ -1,6 +1,7 @@
 //! Contenders of ping-pong beside ours, in addition to the floors of `rohrpost bench local`.
 
-use crate::floors::{Queues, SlotEnd, SlotPair};
+use crate::floors::{Queue, QueueSink, SlotMemory, SlotReceiver, SlotSender};
+use crate::one_way::Duplex;
 use crate::peers::{Iceoryx, Waits, pair};
 use rohrpost_bench_local::Failure;
 use rohrpost_bench_local::hand_over::Wake;
@@ -9,6 +10,9 @@ use rohrpost_bench_local::latency::{Rival, TOUCHED, hand_over};
 
 /// Bytes of [`SPIN_SMALL`].
 const SMALL: usize = 64;
+/// Messages in a queue of the kernel, of which at most one waits. Few, since large messages reach RLIMIT_MSGQUEUE, 800
+/// KiB for all queues of a user.
+const QUEUE_DEPTH: usize = 4;
 
 /// Bare shared memory, polled, with [`SMALL`] bytes, whatever the size of the case: the floor of messages that are not
 /// copied.
@@ -19,8 +23,11 @@ pub(super) const SPIN_SMALL: Rival =
 pub(super) const SLOT_CORE: Rival = Rival {
     name: "slot core",
     turn: |cell| {
-        let pair = Shared::<SlotPair>::new()?;
-        time_two_processes(cell, |end, _| Ok(SlotEnd::new(&pair, end, cell.bytes)))
+        let pair = Shared::<[SlotMemory; 2]>::new()?;
+        time_two_processes(cell, |end, _| {
+            let [out, back] = [end, end.other()].map(|end| &pair[end.index()]);
+            Ok(Duplex(SlotSender::new(out, cell.bytes, 100), SlotReceiver::new(back, cell.bytes)))
+        })
     },
 };
 
@@ -28,8 +35,11 @@ pub(super) const SLOT_CORE: Rival = Rival {
 pub(super) const POSIX_QUEUE: Rival = Rival {
     name: "posix-mq",
     turn: |cell| {
-        let queues = Queues::new(cell.bytes)?;
-        time_two_processes(cell, |end, _| Ok(queues.end(end)))
+        let queues = [Queue::new(QUEUE_DEPTH, cell.bytes)?, Queue::new(QUEUE_DEPTH, cell.bytes)?];
+        time_two_processes(cell, |end, _| {
+            let [out, back] = [end, end.other()].map(|end| &queues[end.index()]);
+            Ok(Duplex(QueueSink::new(out, 0), back))
+        })
     },
 };
 

@@ -14,8 +14,10 @@ use nix::mqueue::{MQ_OFlag, MqAttr, MqdT, mq_close, mq_open, mq_send, mq_timedre
 use nix::sys::stat::Mode;
 use nix::sys::time::TimeSpec;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{
+    End, Failure, OrFail, Placement, Samples, Scheduling, Scratch, sample_in_child, settle,
+};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Receiver, Shape, Type, monotonic_ns, realtime_ns};
 use std::path::Path;
@@ -37,14 +39,21 @@ const BODY: &[u8] = &[7; 64];
 const QUEUE_BYTES_MAX: usize = 8192;
 
 /// All of them.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     let all = [
         (Start::New, StartupClock::Exec),
         (Start::New, StartupClock::Main),
         (Start::Waiting, StartupClock::Exec),
         (Start::Waiting, StartupClock::Main),
     ];
-    all.map(|(start, from)| -> Box<dyn Case> { Box::new(Startup { start, from }) }).into_iter().collect()
+    all.map(|(start, from)| {
+        let end = if from == StartupClock::Exec { "" } else { "-after-main" };
+        let name = format!("startup-{}{end}", start.name());
+        Case::new(name, BODY.len(), "us", move |settings, subject| {
+            Ok(Startup { start, from }.measure(settings, subject))
+        })
+    })
+    .into()
 }
 
 /// Whether its mailbox is there before the program.
@@ -78,23 +87,15 @@ struct Startup {
     from: StartupClock,
 }
 
-impl Case for Startup {
-    fn name(&self) -> String {
-        let from = if self.from == StartupClock::Exec { "" } else { "-after-main" };
-        format!("startup-{}{from}", self.start.name())
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+impl Startup {
+    fn measure(&self, settings: &Settings, subject: &Subject) -> Vec<Row> {
         let starts = settings.count(STARTS);
         let ours = Contender::sampled("rohrpost", || self.turn(starts, HubNode::new));
         let queue = Contender::sampled("posix-mq", || self.turn(starts, HubQueue::new));
-        let subject = Subject { case: self.name(), bytes: Some(BODY.len()), unit: "us" };
-        let target = (self.from == StartupClock::Exec).then_some(Target::AtMost(1.5));
-        Ok(compare(settings, &subject, &[ours, queue], &[Versus { name: "posix-mq", p50: target, p99: None }]))
+        let target = at_most(1.5).filter(|_| self.from == StartupClock::Exec);
+        compare(settings, subject, &[ours, queue.beside(target, None)])
     }
-}
 
-impl Startup {
     /// Microseconds of each start.
     fn turn<G: Host>(&self, starts: usize, ground: impl FnOnce() -> Done<G>) -> Result<Vec<f64>, Failure> {
         sample_in_child(PATIENCE, |samples| self.start_all(starts, ground, samples).map_err(as_failure("start-up")))
@@ -286,7 +287,7 @@ pub(super) fn run_hidden_program() -> Option<Result<(), Failure>> {
         _ => Err(format!("{ROLE}: no such program: {role}").into()),
     };
     let said = first_ns.map(|first_ns| println!("{main_ns} {first_ns}"));
-    Some(said.map_err(|error| Failure::of("hidden program", error)))
+    Some(said.or_fail("hidden program"))
 }
 
 fn with_mailbox(hello: bool, path: &Path) -> Done<u64> {

@@ -6,6 +6,6 @@ mod slot_core;
 mod two_rings;
 pub mod vyukov;
 
-pub use queue::{Queue, QueueEnd, Queues};
-pub use slot_core::{SlotEnd, SlotMemory, SlotPair, SlotReceiver, SlotSender};
+pub use queue::{Queue, QueueSink};
+pub use slot_core::{SlotMemory, SlotReceiver, SlotSender};
 pub use two_rings::{TwoRings, TwoRingsReceiver, TwoRingsSender};

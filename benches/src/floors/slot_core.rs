@@ -7,7 +7,7 @@
 
 use super::ring::CacheLine;
 use crate::one_way::{Sink, Source};
-use rohrpost_bench_local::harness::{End, Failure, Link, Shared, Zeroable};
+use rohrpost_bench_local::harness::{Failure, Zeroable};
 use std::cell::UnsafeCell;
 use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
@@ -99,16 +99,6 @@ impl<'a> SlotSender<'a> {
         prefetch_to_write(&raw const memory.words[self.next]);
         prefetch_to_write(memory.body(self.next, self.stride));
     }
-
-    fn send_bytes(&mut self, message: &[u8]) {
-        assert!(message.len() <= self.stride, "larger than a slot");
-        let slot = self.claim();
-        // SAFETY: claimed, and the message fits.
-        unsafe {
-            std::ptr::copy_nonoverlapping(message.as_ptr(), self.memory.body(slot, self.stride), message.len());
-        }
-        self.publish(slot);
-    }
 }
 
 /// The receiver.
@@ -166,8 +156,23 @@ impl<'a> SlotReceiver<'a> {
         }
         self.heap.pop().map(|(_, slot)| slot)
     }
+}
 
-    fn receive_bytes(&mut self, message: &mut [u8]) {
+impl Sink for SlotSender<'_> {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        assert!(message.len() <= self.stride, "larger than a slot");
+        let slot = self.claim();
+        // SAFETY: claimed, and the message fits.
+        unsafe {
+            std::ptr::copy_nonoverlapping(message.as_ptr(), self.memory.body(slot, self.stride), message.len());
+        }
+        self.publish(slot);
+        Ok(())
+    }
+}
+
+impl Source for SlotReceiver<'_> {
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         let slot = loop {
             if let Some(slot) = self.take() {
                 break slot;
@@ -179,52 +184,7 @@ impl<'a> SlotReceiver<'a> {
             std::ptr::copy_nonoverlapping(self.memory.body(slot, self.stride), message.as_mut_ptr(), message.len())
         };
         self.memory.words[slot].0.store(FREE, Ordering::Release);
-    }
-}
-
-impl Sink for SlotSender<'_> {
-    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.send_bytes(message);
         Ok(())
-    }
-}
-
-impl Source for SlotReceiver<'_> {
-    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
-        self.receive_bytes(message);
-        Ok(())
-    }
-}
-
-/// Both directions.
-#[repr(C)]
-pub struct SlotPair([SlotMemory; 2]);
-
-// SAFETY: made of such.
-unsafe impl Zeroable for SlotPair {}
-
-/// One end.
-pub struct SlotEnd<'a> {
-    out: SlotSender<'a>,
-    back: SlotReceiver<'a>,
-}
-
-impl<'a> SlotEnd<'a> {
-    /// For messages of this many bytes, of which fewer may be touched.
-    pub fn new(pair: &'a Shared<SlotPair>, end: End, bytes: usize) -> Self {
-        let [there, back] = &pair.0;
-        let (out, back) = if end == End::Ping { (there, back) } else { (back, there) };
-        Self { out: SlotSender::new(out, bytes, 100), back: SlotReceiver::new(back, bytes) }
-    }
-}
-
-impl Link for SlotEnd<'_> {
-    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.out.send(message)
-    }
-
-    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
-        self.back.receive(message)
     }
 }
 

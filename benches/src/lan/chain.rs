@@ -32,7 +32,7 @@ const RELAY: Name = Name::new(1, 2, 0, 0);
 pub fn time_chain(wire: &Wire, cell: &Cell) -> Result<Vec<f64>, Failure> {
     let nodes = [Shared::<Lanes>::new()?, Shared::<Lanes>::new()?];
     // On its node the module is the near side of the lanes, both relays together are the far one.
-    let side = |end, side| Ok(HandOver::new(&nodes[usize::from(end == End::Pong)], side, Wake::Futex));
+    let side = |end: End, side| Ok(HandOver::new(&nodes[end.index()], side, Wake::Futex));
     time(wire, cell, |end, _| side(end, End::Pong), |end, _| side(end, End::Ping))
 }
 
@@ -42,9 +42,7 @@ pub fn time_chain(wire: &Wire, cell: &Cell) -> Result<Vec<f64>, Failure> {
 /// As [`time_chain`].
 pub fn time_mailbox_chain(wire: &Wire, cell: &Cell) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
-    let station = |end, own, other| {
-        Station::open(&scratch.directory().join(if end == End::Ping { "near" } else { "far" }), own, other, cell.bytes)
-    };
+    let station = |end: End, own, other| Station::open(&scratch.directory().join(end.node()), own, other, cell.bytes);
     let relay = |end, goes| match goes {
         Goes::Out => station(end, Some(RELAY), MODULE),
         Goes::In => station(end, None, MODULE),

@@ -1,8 +1,10 @@
 //! Two modules on two nodes, by the public interface of mailboxes alone.
 
-use super::flow::{Inlet, LOOK, Outlet};
+use super::flow::{LOOK, Outlet};
+use crate::one_way::Sink;
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, Link, Meetings};
+use rohrpost_bench_local::harness::{Child, Link, Meetings, OrFail, copy_whole};
+use rohrpost_bench_local::ours::shape;
 use rohrpost_mailbox::{
     Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
@@ -38,10 +40,9 @@ impl Module {
         meetings: &mut Meetings,
     ) -> Result<Self, Failure> {
         let participant = join(directory, own)?;
-        let shape = Shape { body_bytes_max: body(bytes)?, ..Shape::default() };
-        let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
+        let receiver = participant.receiver(own, shape(bytes)?).or_fail("mailbox")?;
         meetings.meet()?;
-        let sender = participant.sender(other).map_err(|error| Failure::of("way to the other node", error))?;
+        let sender = participant.sender(other).or_fail("way to the other node")?;
         let label = Label { from: own, kind: Type::data(0), priority: Priority(own.class().0), ..Label::default() };
         Ok(Self { receiver, sender, label, patience: None })
     }
@@ -55,14 +56,14 @@ impl Module {
 
 impl Link for Module {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.sender.send(&self.label, &[message]).map_err(|error| Failure::of("send", error))
+        self.sender.send(&self.label, &[message]).or_fail("send")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         let deadline = self.patience.map(|patience| Instant::now() + patience);
         let package = self.receiver.receive_timeout(Waiting { spin: Duration::ZERO, deadline });
         let package = package.ok_or_else(|| Failure::Failed("a package is lost".into()))?;
-        copy(package.body(), message)
+        copy_whole(package.body(), message)
     }
 }
 
@@ -82,7 +83,7 @@ pub fn await_way([from, to]: [&Path; 2], [own, other]: [Name; 2]) -> Result<(), 
         }
         Ok(())
     })?;
-    sends.finish(Instant::now() + COMES_WITHIN).map_err(|failure| Failure::of("no package comes", failure))
+    sends.finish(Instant::now() + COMES_WITHIN).or_fail("no package comes")
 }
 
 /// The sending side of a stream of packages.
@@ -98,13 +99,11 @@ impl LanSource {
     /// When there is no route to the other node.
     pub fn open(directory: &Path, own: Name, to: Name) -> Result<Self, Failure> {
         let participant = join(directory, own)?;
-        let sender = participant.sender(to).map_err(|error| Failure::of("way to the other node", error))?;
+        let sender = participant.sender(to).or_fail("way to the other node")?;
         let label = Label { from: own, kind: Type::data(0), priority: Priority(own.class().0), ..Label::default() };
         Ok(Self { sender, label })
     }
-}
 
-impl LanSource {
     /// From now on sends data of this type.
     #[must_use]
     pub fn of_type(self, kind: Type) -> Self {
@@ -124,7 +123,7 @@ impl LanSource {
     }
 }
 
-impl Inlet for LanSource {
+impl Sink for LanSource {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         // The receiver counts what is missing.
         self.offer(message).map(drop)
@@ -143,9 +142,8 @@ impl LanSink {
     /// When it cannot be made.
     pub fn open(directory: &Path, own: Name, bytes: usize) -> Result<Self, Failure> {
         let participant = join(directory, own)?;
-        let shape =
-            Shape { slots: SLOTS, body_bytes_max: body(bytes)?, full: OverflowPolicy::Reject, ..Shape::default() };
-        let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
+        let shape = Shape { slots: SLOTS, full: OverflowPolicy::Reject, ..shape(bytes)? };
+        let receiver = participant.receiver(own, shape).or_fail("mailbox")?;
         Ok(Self { receiver })
     }
 
@@ -160,30 +158,19 @@ impl Outlet for LanSink {
     fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
         // With a package there it reads no clock.
         let waiting = match self.receiver.try_receive() {
-            Some(package) => return copy(package.body(), message).map(|()| true),
+            Some(package) => return copy_whole(package.body(), message).map(|()| true),
             None => Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + LOOK) },
         };
         match self.receiver.receive_timeout(waiting) {
-            Some(package) => copy(package.body(), message).map(|()| true),
+            Some(package) => copy_whole(package.body(), message).map(|()| true),
             None => Ok(false),
         }
     }
 }
 
-fn join(directory: &Path, own: Name) -> Result<Arc<Participant>, Failure> {
-    let node = Node::open(directory).map_err(|error| Failure::of("node", error))?;
+/// A participant on an existing node; without a name, or in the name of the module of this mailbox.
+pub(super) fn join(directory: &Path, own: Name) -> Result<Arc<Participant>, Failure> {
+    let node = Node::open(directory).or_fail("node")?;
     let module = Name::new(own.system(), own.class().0, own.instance(), 0);
-    Participant::join(&node, module).map_err(|error| Failure::of("node", error))
-}
-
-fn body(bytes: usize) -> Result<u16, Failure> {
-    u16::try_from(bytes).map_err(|error| Failure::of("size", error))
-}
-
-fn copy(body: &[u8], message: &mut [u8]) -> Result<(), Failure> {
-    if body.len() != message.len() {
-        return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), message.len())));
-    }
-    message.copy_from_slice(body);
-    Ok(())
+    Participant::join(&node, module).or_fail("node")
 }

@@ -1,20 +1,12 @@
 //! Messages in one direction at the full rate, with losses allowed: received and lost messages are counted.
 
 use crate::floors::ring::Bell;
+use crate::one_way::Sink;
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
+use rohrpost_bench_local::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, copy_whole, settle};
 use rohrpost_mailbox::{monotonic_ns, sys};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-
-/// The sending side.
-pub trait Inlet {
-    /// Sends a message; never waits for its receiver.
-    ///
-    /// # Errors
-    /// When it cannot be sent.
-    fn send(&mut self, message: &[u8]) -> Result<(), Failure>;
-}
 
 /// The receiving side.
 pub trait Outlet {
@@ -99,12 +91,12 @@ struct FlowTurn {
 // SAFETY: atomics only.
 unsafe impl Zeroable for FlowTurn {}
 
-/// Sends from one process to another. Each opens its own side; the receiver first. Messages must be whole and in order,
+/// Sends from one process to another; `inlet` never waits for its receiver. Each opens its own side; the receiver first. Messages must be whole and in order,
 /// without duplicates.
 ///
 /// # Errors
 /// What the receiver failed with, else the sender; also when nothing arrived.
-pub fn flow<I: Inlet, O: Outlet>(
+pub fn flow<I: Sink, O: Outlet>(
     flow: &Flow,
     inlet: impl Fn() -> Result<I, Failure>,
     outlet: impl Fn() -> Result<O, Failure>,
@@ -138,7 +130,7 @@ pub fn flow<I: Inlet, O: Outlet>(
     Ok(flown)
 }
 
-fn send_all(inlet: &mut impl Inlet, flow: &Flow, turn: &FlowTurn) -> Result<(), Failure> {
+fn send_all(inlet: &mut impl Sink, flow: &Flow, turn: &FlowTurn) -> Result<(), Failure> {
     let mut message = vec![FILLER; flow.bytes];
     let over = Instant::now() + flow.cap;
     let mut window = Window { size: flow.window.unwrap_or(u64::MAX), lost_before: 0 };
@@ -258,14 +250,10 @@ fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &FlowTurn) -> Result
 /// # Errors
 /// When it has another length.
 pub(super) fn look_at(body: &[u8], message: &mut [u8]) -> Result<(), Failure> {
-    if body.len() != message.len() {
-        return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), message.len())));
+    if body.len() != message.len() || number_at(body, 0).is_multiple_of(LOOK_EVERY) {
+        return copy_whole(body, message);
     }
-    if number_at(body, 0).is_multiple_of(LOOK_EVERY) {
-        message.copy_from_slice(body);
-    } else {
-        put_ends(body, message);
-    }
+    put_ends(body, message);
     Ok(())
 }
 

@@ -2,14 +2,13 @@
 
 use super::ends::{Module, await_way};
 use super::records::{self, RECORDS};
-use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all};
-use super::wire::{Wire, address, name_of};
+use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all, make_keys};
+use super::wire::{Wire, address};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{End, Meetings, Placement, Scheduling, Scratch, settle};
+use rohrpost_bench_local::harness::{End, Meetings, OrFail, Placement, Scheduling, Scratch, settle};
 use rohrpost_mailbox::{Class, Name, StreamShape};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 const INSTALLATION: &str = "bench-lan";
 /// Class of the modules that are timed, and of those that flood.
@@ -33,8 +32,11 @@ pub struct Network {
     pub records: Option<StreamShape>,
 }
 
-/// More than the computer can do, so that it is not in the way.
-pub const UNPACED: &str = "64 GiB";
+/// Of a current Ethernet.
+pub const ETHERNET: u16 = 1_500;
+
+/// An Ethernet with routers that may send more than the computer can do, so that this is not in the way.
+pub const UNPACED: Network = Network { mtu: ETHERNET, rate: "64 GiB", quota: "1 MiB", sealed: false, records: None };
 
 /// Two nodes, until this is dropped.
 pub struct Nodes {
@@ -52,7 +54,7 @@ impl Nodes {
         let mut nodes = Self { scratch: Scratch::new()?, routers: Vec::new() };
         let config = nodes.scratch.directory().join("bench-lan.toml");
         let text = configuration(network);
-        fs::write(&config, text).map_err(|error| Failure::of("configuration", error))?;
+        fs::write(&config, text).or_fail("configuration")?;
         if network.sealed {
             make_keys(&command, &nodes.scratch.directory().join("keys"))?;
         }
@@ -82,7 +84,7 @@ impl Nodes {
     /// # Errors
     /// As [`Module::between`].
     pub fn module(&self, end: End, turn: u8, bytes: usize, meetings: &mut Meetings) -> Result<Module, Failure> {
-        let other = bench(if end == End::Ping { End::Pong } else { End::Ping }, turn);
+        let other = bench(end.other(), turn);
         Module::between(&self.directory(end), [bench(end, turn), other], bytes, meetings)
     }
 
@@ -98,15 +100,8 @@ impl Drop for Nodes {
     }
 }
 
-fn make_keys(command: &Path, folder: &Path) -> Result<(), Failure> {
-    let made = Command::new(command).args(["keys", "new"]).arg(folder).output();
-    let made = made.map_err(|error| Failure::of("rohrpost keys", error))?;
-    let said = || String::from_utf8_lossy(&made.stderr).into_owned();
-    if made.status.success() { Ok(()) } else { Err(Failure::Failed(format!("rohrpost keys new: {}", said()))) }
-}
-
 fn spec<'a>(end: End, command: &'a Path, config: &'a Path, scratch: &'a Path) -> RouterSpec<'a> {
-    RouterSpec { command, config, installation: INSTALLATION, node: name_of(end).into(), index: index(end), scratch }
+    RouterSpec { command, config, installation: INSTALLATION, node: end.node().into(), index: index(end), scratch }
 }
 
 /// Of the node in the configuration, and so of its router.
@@ -131,14 +126,14 @@ fn configuration(network: &Network) -> String {
     let [near, far] = [End::Ping, End::Pong].map(address);
     let modules = [("bench", End::Ping), ("bench", End::Pong), ("flood", End::Ping), ("flood", End::Pong)];
     let modules = modules.map(|(class, end)| {
-        let (instance, node) = (index(end), name_of(end));
+        let (instance, node) = (index(end), end.node());
         // Never launched: the processes of a turn take their place.
         format!(
             "[[module]]\nname = \"{class}.{instance}\"\nnode = \"{node}\"\nprogram = \"{class}\"\noptional = true\n"
         )
     });
     let replica =
-        |shape: StreamShape, from: End, to: End| records::entries(index(from), name_of(from), &[name_of(to)], shape);
+        |shape: StreamShape, from: End, to: End| records::entries(index(from), from.node(), &[to.node()], shape);
     let replicas =
         records.map(|shape| [replica(shape, End::Ping, End::Pong), replica(shape, End::Pong, End::Ping)].concat());
     format!(

@@ -5,16 +5,15 @@
 //! ```
 //! A record is written whole and read in place. Which records come is the routers' matter; what reads them counts.
 
-use super::flow::{Inlet, LOOK, Outlet, SILENCE, look_at};
+use super::ends::join;
+use super::flow::{LOOK, Outlet, SILENCE, look_at};
 use super::router::SYSTEM;
+use crate::one_way::Sink;
 use crate::streams::{came, stamp, stream_failure};
-use rohrpost_bench_local::harness::{Child, Failure, Link};
-use rohrpost_mailbox::{
-    Class, Name, Next, Node, Participant, Shape, StreamId, StreamReader, StreamShape, StreamWriter, Waiting,
-};
+use rohrpost_bench_local::harness::{Child, Failure, Link, OrFail, copy_whole};
+use rohrpost_mailbox::{Class, Name, Next, Shape, StreamId, StreamReader, StreamShape, StreamWriter, Waiting};
 use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
 use std::path::Path;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Class of the modules that write streams.
@@ -51,11 +50,10 @@ pub fn entries(instance: u8, node: &str, to: &[&str], shape: StreamShape) -> Str
 /// When that takes too long.
 pub fn begin(from: &Path, to: &Path, instance: u8, shape: StreamShape) -> Result<(), Failure> {
     let begun = Child::start(|| {
-        let participant = join(from)?;
-        let module = participant.receiver(stream(instance).name, Shape::default());
-        let module = module.map_err(|error| Failure::of("mailbox", error))?;
+        let participant = join(from, Name::NONE)?;
+        let module = participant.receiver(stream(instance).name, Shape::default()).or_fail("mailbox")?;
         // It stays when its mailbox has no owner any more.
-        module.set_about(&description().to_bytes()).map_err(|error| Failure::of("description", error))?;
+        module.set_about(&description().to_bytes()).or_fail("description")?;
         let (mut inlet, mut outlet) = (RecordInlet::open(from, instance, shape)?, RecordOutlet::open(to, instance)?);
         loop {
             inlet.send(&[])?;
@@ -65,7 +63,7 @@ pub fn begin(from: &Path, to: &Path, instance: u8, shape: StreamShape) -> Result
             std::thread::sleep(WRITE_EACH);
         }
     })?;
-    begun.finish(Instant::now() + BEGINS_WITHIN).map_err(|failure| Failure::of("a replica does not begin", failure))
+    begun.finish(Instant::now() + BEGINS_WITHIN).or_fail("a replica does not begin")
 }
 
 fn description() -> Description {
@@ -73,11 +71,6 @@ fn description() -> Description {
     let item = DataItem { number: NUMBER, kind: DataKind::Stream, field };
     let (name, class) = ("Recording".into(), "records".into());
     Description { name, class, text: String::new(), functions: Vec::new(), data: vec![item] }
-}
-
-fn join(directory: &Path) -> Result<Arc<Participant>, Failure> {
-    let node = Node::open(directory).map_err(|error| Failure::of("node", error))?;
-    Participant::join(&node, Name::NONE).map_err(|error| Failure::of("node", error))
 }
 
 /// The writing side.
@@ -91,15 +84,15 @@ impl RecordInlet {
     /// # Errors
     /// When somebody else does, or there is no memory for it.
     pub fn open(directory: &Path, instance: u8, shape: StreamShape) -> Result<Self, Failure> {
-        let writer = join(directory)?.stream_writer(stream(instance), shape).map_err(stream_failure)?;
+        let writer = join(directory, Name::NONE)?.stream_writer(stream(instance), shape).map_err(stream_failure)?;
         Ok(Self { writer })
     }
 }
 
-impl Inlet for RecordInlet {
+impl Sink for RecordInlet {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         let stamp = stamp(self.writer.written());
-        self.writer.write(stamp, message).map(drop).map_err(|error| Failure::of("write", error))
+        self.writer.write(stamp, message).map(drop).or_fail("write")
     }
 }
 
@@ -114,7 +107,7 @@ impl RecordOutlet {
     /// # Errors
     /// When all its seats are taken.
     pub fn open(directory: &Path, instance: u8) -> Result<Self, Failure> {
-        let reader = join(directory)?.stream_reader(stream(instance)).map_err(stream_failure)?;
+        let reader = join(directory, Name::NONE)?.stream_reader(stream(instance)).map_err(stream_failure)?;
         Ok(Self { reader })
     }
 
@@ -162,7 +155,7 @@ impl RecordLink {
 
 impl Link for RecordLink {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        Inlet::send(&mut self.inlet, message)
+        self.inlet.send(message)
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
@@ -172,10 +165,6 @@ impl Link for RecordLink {
             // One of those with which it began.
             info = came(self.reader.next_timeout_into(&mut self.body, waiting))?;
         }
-        if info.len_bytes != message.len() {
-            return Err(Failure::Failed(format!("{} bytes came, not {}", info.len_bytes, message.len())));
-        }
-        message.copy_from_slice(&self.body);
-        Ok(())
+        copy_whole(&self.body, message)
     }
 }

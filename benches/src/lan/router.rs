@@ -2,7 +2,7 @@
 
 use nix::sys::signal::Signal;
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::Child;
+use rohrpost_bench_local::harness::{Child, OrFail, look_for};
 use rohrpost_mailbox::{Class, Name, Node, local, node_directory};
 use std::fs;
 use std::os::unix::process::CommandExt;
@@ -67,7 +67,7 @@ impl Router {
     pub fn start(spec: &RouterSpec<'_>, prepare: impl FnOnce() -> Result<(), Failure>) -> Result<Self, Failure> {
         let child = Child::start(|| {
             prepare()?;
-            let log = fs::File::create(spec.log()).map_err(|error| Failure::of("router's log", error))?;
+            let log = fs::File::create(spec.log()).or_fail("router's log")?;
             let error = Command::new(spec.command)
                 .args(["router", "--config"])
                 .arg(spec.config)
@@ -89,18 +89,14 @@ impl Router {
     /// # Errors
     /// Its output, if it ended or did not get ready.
     pub fn await_ready(&mut self) -> Result<(), Failure> {
-        let give_up = Instant::now() + READY_WITHIN;
-        while !has_mailbox(&self.directory, self.transit) {
-            if self.child.has_ended()? || Instant::now() > give_up {
-                return Err(Failure::Failed(format!(
-                    "the router of node `{}` did not get ready: {}",
-                    self.node,
-                    self.said()
-                )));
-            }
-            std::thread::sleep(LOOK_EACH);
+        let ready = look_for(READY_WITHIN, LOOK_EACH, || match has_mailbox(&self.directory, self.transit) {
+            true => Ok(Some(true)),
+            false => Ok(self.child.has_ended()?.then_some(false)),
+        })?;
+        if ready == Some(true) {
+            return Ok(());
         }
-        Ok(())
+        Err(Failure::Failed(format!("the router of node `{}` did not get ready: {}", self.node, self.said())))
     }
 
     /// Place of its node in the configuration.
@@ -117,6 +113,16 @@ impl Router {
     pub fn pid(&self) -> i32 {
         self.child.pid()
     }
+}
+
+/// Makes keys or certificates.
+///
+/// # Errors
+/// What the command says.
+pub(crate) fn make_keys(command: &Path, what: &Path) -> Result<(), Failure> {
+    let made = Command::new(command).args(["keys", "new"]).arg(what).output().or_fail("rohrpost keys new")?;
+    let said = || Failure::of("rohrpost keys new", String::from_utf8_lossy(&made.stderr));
+    if made.status.success() { Ok(()) } else { Err(said()) }
 }
 
 /// Ends all, and waits until they have told their peers.

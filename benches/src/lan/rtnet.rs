@@ -11,7 +11,7 @@ use super::wire::{Wire, address};
 use nix::sys::socket::{ControlMessageOwned, MsgFlags, SockaddrIn, recvmsg, setsockopt, sockopt};
 use nix::sys::time::TimeSpec;
 use rohrpost_bench_local::harness::{
-    Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle,
+    Child, End, Failure, Gate, OrFail, Placement, Samples, Scheduling, Shared, Zeroable, settle,
 };
 use rohrpost_mailbox::realtime_ns;
 use std::io::IoSliceMut;
@@ -101,7 +101,7 @@ impl Stamped {
             setsockopt(&socket, sockopt::ReceiveTimestampns, &true)?;
             Ok::<_, std::io::Error>(socket)
         };
-        opened().map(Self).map_err(|error| Failure::of("socket of RTnet's formula", error))
+        opened().map(Self).or_fail("socket of RTnet's formula")
     }
 
     fn send(&self, to: std::net::IpAddr, stamps_ns: [i64; 2]) -> Result<(), Failure> {
@@ -109,7 +109,7 @@ impl Stamped {
         let (first, second) = message.split_at_mut(MESSAGE_BYTES / 2);
         first.copy_from_slice(&stamps_ns[0].to_le_bytes());
         second.copy_from_slice(&stamps_ns[1].to_le_bytes());
-        self.0.send_to(&message, (to, PORT)).map(drop).map_err(|error| Failure::of("send", error))
+        self.0.send_to(&message, (to, PORT)).map(drop).or_fail("send")
     }
 
     /// The stamps in the next message, and when the kernel received it.
@@ -117,9 +117,9 @@ impl Stamped {
         let mut message = [0; MESSAGE_BYTES];
         let mut parts = [IoSliceMut::new(&mut message)];
         let mut space = nix::cmsg_space!(TimeSpec);
-        let received = recvmsg::<SockaddrIn>(self.0.as_raw_fd(), &mut parts, Some(&mut space), MsgFlags::empty());
-        let received = received.map_err(|error| Failure::of("recvmsg", error))?;
-        let stamps = received.cmsgs().map_err(|error| Failure::of("receive stamp", error))?;
+        let received = recvmsg::<SockaddrIn>(self.0.as_raw_fd(), &mut parts, Some(&mut space), MsgFlags::empty())
+            .or_fail("recvmsg")?;
+        let stamps = received.cmsgs().or_fail("receive stamp")?;
         let stamp = stamps.into_iter().find_map(|stamp| match stamp {
             ControlMessageOwned::ScmTimestampns(time) => Some(time.tv_sec() * 1_000_000_000 + time.tv_nsec()),
             _ => None,

@@ -1,6 +1,6 @@
 //! What has left a node, as the kernel counts it at the node's device.
 
-use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::{Failure, OrFail};
 use rohrpost_routers::lab::DEVICE;
 
 /// Devices of the namespace of the process that reads it.
@@ -24,7 +24,7 @@ impl Sent {
     /// # Errors
     /// When its device is not told.
     pub fn now() -> Result<Self, Failure> {
-        let text = std::fs::read_to_string(DEVICES).map_err(|error| Failure::of(DEVICES, error))?;
+        let text = std::fs::read_to_string(DEVICES).or_fail(DEVICES)?;
         Self::parse(&text).ok_or_else(|| Failure::Failed(format!("{DEVICES} says nothing of `{DEVICE}`: {text}")))
     }
 

@@ -1,9 +1,10 @@
 //! Datagrams from socket to socket, as the kernel carries them: one system call to send, one to receive.
 
-use super::flow::{FILLER, Inlet, Outlet, look_at, put_ends};
+use super::flow::{FILLER, Outlet, look_at, put_ends};
 use super::wire::{Wire, address};
+use crate::one_way::Sink;
 use nix::sys::socket::{setsockopt, sockopt};
-use rohrpost_bench_local::harness::{End, Failure, Link};
+use rohrpost_bench_local::harness::{End, Failure, Link, OrFail};
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
@@ -31,9 +32,8 @@ impl Datagrams {
     /// When that is refused.
     pub fn between(wire: &Wire, end: End, ports: [u16; 2]) -> Result<Self, Failure> {
         wire.enter(end)?;
-        let (own, other) = if end == End::Ping { (0, 1) } else { (1, 0) };
-        let other_end = if end == End::Ping { End::Pong } else { End::Ping };
-        Self::connect((address(end), ports[own]).into(), (address(other_end), ports[other]).into())
+        let [own, other] = [end, end.other()].map(|end| (address(end), ports[end.index()]).into());
+        Self::connect(own, other)
     }
 
     /// From one address to another, in the place where the calling thread is.
@@ -50,7 +50,7 @@ impl Datagrams {
             socket.connect(other)?;
             Ok(socket)
         };
-        opened().map(Self).map_err(|error| Failure::of("udp socket", error))
+        opened().map(Self).or_fail("udp socket")
     }
 
     /// Sets the timeout of receiving.
@@ -58,7 +58,7 @@ impl Datagrams {
     /// # Errors
     /// When the kernel refuses it.
     pub fn with_patience(self, patience: Duration) -> Result<Self, Failure> {
-        self.0.set_read_timeout(Some(patience)).map_err(|error| Failure::of("udp socket", error))?;
+        self.0.set_read_timeout(Some(patience)).or_fail("udp socket")?;
         Ok(self)
     }
 
@@ -79,7 +79,7 @@ impl Datagrams {
 
 impl Link for Datagrams {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.0.send(message).map(drop).map_err(|error| Failure::of("send", error))
+        self.0.send(message).map(drop).or_fail("send")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
@@ -88,7 +88,7 @@ impl Link for Datagrams {
     }
 }
 
-impl Inlet for Datagrams {
+impl Sink for Datagrams {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         Link::send(self, message)
     }
@@ -122,11 +122,11 @@ impl RawParts {
     }
 }
 
-impl Inlet for RawParts {
+impl Sink for RawParts {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         let (datagrams, part) = self.next(message.len());
         put_ends(message, part);
-        datagrams.0.send(part).map(drop).map_err(|error| Failure::of("send", error))
+        datagrams.0.send(part).map(drop).or_fail("send")
     }
 }
 

@@ -15,8 +15,7 @@ impl Wire {
     /// # Errors
     /// [`Failure::Skipped`] when the system allows no namespaces.
     pub fn new(mtu: u16) -> Result<Self, Failure> {
-        let node = |end| NodeSpec { name: name_of(end).into(), address: address(end) };
-        Lab::new(&[node(End::Ping), node(End::Pong)], mtu).map(|lab| Self { lab }).map_err(failure)
+        Self::of(&[node(End::Ping), node(End::Pong)], mtu)
     }
 
     /// The same with a third computer on it, which is no node.
@@ -24,9 +23,12 @@ impl Wire {
     /// # Errors
     /// As [`Self::new`].
     pub fn with_stranger(mtu: u16) -> Result<Self, Failure> {
-        let node = |end| NodeSpec { name: name_of(end).into(), address: address(end) };
         let stranger = NodeSpec { name: STRANGER.into(), address: Ipv4Addr::new(10, 117, 0, 3).into() };
-        Lab::new(&[node(End::Ping), node(End::Pong), stranger], mtu).map(|lab| Self { lab }).map_err(failure)
+        Self::of(&[node(End::Ping), node(End::Pong), stranger], mtu)
+    }
+
+    fn of(nodes: &[NodeSpec], mtu: u16) -> Result<Self, Failure> {
+        Lab::new(nodes, mtu).map(|lab| Self { lab }).map_err(failure)
     }
 
     /// Moves the calling process to the third computer for good.
@@ -42,15 +44,17 @@ impl Wire {
     /// # Errors
     /// When it may not.
     pub fn enter(&self, end: End) -> Result<(), Failure> {
-        self.go(name_of(end))
+        self.go(end.node())
     }
 
     fn go(&self, place: &str) -> Result<(), Failure> {
-        let inside = self.lab.enter(place).map_err(failure)?;
         // Dropped, it would lead out again.
-        std::mem::forget(inside);
-        Ok(())
+        self.lab.enter(place).map(std::mem::forget).map_err(failure)
     }
+}
+
+fn node(end: End) -> NodeSpec {
+    NodeSpec { name: end.node().into(), address: address(end) }
 }
 
 /// The third computer.
@@ -68,11 +72,6 @@ pub(crate) fn failure(error: LabError) -> Failure {
         LabError::NotAllowed(_) => Failure::Skipped(format!("no namespaces here: {error}")),
         error => Failure::of("network", error),
     }
-}
-
-/// Of an end's node.
-pub fn name_of(end: End) -> &'static str {
-    if end == End::Ping { "near" } else { "far" }
 }
 
 /// Of an end.

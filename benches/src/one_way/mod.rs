@@ -2,14 +2,12 @@
 
 mod ours;
 mod peers;
-mod queue;
 
 pub use ours::{OurSink, OurSource, OwnNode, Retry};
 pub use peers::{channel_rate, iceoryx_rate};
-pub use queue::QueueSink;
 
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
+use rohrpost_bench_local::harness::{Child, End, Gate, Link, Placement, Scheduling, Shared, Zeroable, settle};
 use rohrpost_mailbox::monotonic_ns;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -32,8 +30,21 @@ pub trait Source {
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure>;
 }
 
+/// One end of a ping-pong: the way out, and the way back.
+pub struct Duplex<S, R>(pub S, pub R);
+
+impl<S: Sink, R: Source> Link for Duplex<S, R> {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        self.0.send(message)
+    }
+
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        self.1.receive(message)
+    }
+}
+
 /// Most senders of a stream.
-pub const SENDERS_MAX: usize = 8;
+const SENDERS_MAX: usize = 8;
 /// A message is its number, its sender, filler, and its number again.
 const NUMBER_BYTES: usize = 8;
 const FILLER: u8 = 0xa5;

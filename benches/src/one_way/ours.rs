@@ -2,10 +2,9 @@
 
 use super::{Sink, Source};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::Scratch;
-use rohrpost_mailbox::{
-    Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
-};
+use rohrpost_bench_local::harness::{OrFail, Scratch, copy_whole};
+use rohrpost_bench_local::ours::join;
+use rohrpost_mailbox::{Label, Name, OverflowPolicy, Priority, Receiver, SendError, Sender, Shape, Type, Waiting};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -34,20 +33,12 @@ impl OwnNode {
         self.scratch.directory().join("node")
     }
 
-    /// What its mailbox is made as.
-    pub fn shape(&self) -> Shape {
-        self.shape
-    }
-
     /// Makes the mailbox.
     ///
     /// # Errors
     /// When there is no memory for it.
     pub fn source(&self, spins: bool) -> Result<OurSource, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::of("receiver", error);
-        let node = Node::create(&self.path(), 0o700).map_err(|error| failed(&error))?;
-        let participant = Participant::join(&node, MAILBOX).map_err(|error| failed(&error))?;
-        let receiver = participant.receiver(MAILBOX, self.shape).map_err(|error| failed(&error))?;
+        let receiver = join(&self.path(), MAILBOX)?.receiver(MAILBOX, self.shape).or_fail("receiver")?;
         let spin = if spins { SPIN } else { Duration::ZERO };
         Ok(OurSource { receiver, waiting: Waiting { spin, deadline: None } })
     }
@@ -57,10 +48,7 @@ impl OwnNode {
     /// # Errors
     /// When it is not.
     pub fn sink(&self, priority: u8, retry: Retry) -> Result<OurSink, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::of("sender", error);
-        let node = Node::open(&self.path()).map_err(|error| failed(&error))?;
-        let participant = Participant::join(&node, Name::NONE).map_err(|error| failed(&error))?;
-        let sender = participant.sender(MAILBOX).map_err(|error| failed(&error))?;
+        let sender = join(&self.path(), Name::NONE)?.sender(MAILBOX).or_fail("sender")?;
         let label = Label { kind: Type::data(0), priority: Priority(priority), ..Label::default() };
         Ok(OurSink { sender, label, ids: 1, retry })
     }
@@ -137,12 +125,7 @@ impl Source for OurSource {
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         loop {
             if let Some(package) = self.receiver.receive_timeout(self.waiting) {
-                let body = package.body();
-                if body.len() != message.len() {
-                    return Err(Failure::Failed(format!("a body of {} bytes, not {}", body.len(), message.len())));
-                }
-                message.copy_from_slice(body);
-                return Ok(());
+                return copy_whole(package.body(), message);
             }
         }
     }

@@ -4,23 +4,11 @@ use super::{Sink, Source, Stream, StreamTurn, receive_all, send_all};
 use crate::peers::{IceoryxReceiver, IceoryxSender};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, End, Placement, Scratch, Shared, settle};
+use rohrpost_bench_local::harness::{Child, End, OrFail, Placement, Scratch, Shared, settle};
 use std::time::Instant;
 
 /// How many messages wait at most.
 const DEPTH: usize = crate::floors::ring::DEPTH;
-
-impl Sink for IceoryxSender {
-    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.publish(message)
-    }
-}
-
-impl Source for IceoryxReceiver {
-    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
-        self.take(message)
-    }
-}
 
 /// Messages a second through iceoryx2; the receiver spins, or waits for a notifier.
 ///
@@ -36,8 +24,8 @@ struct ChannelSink<const N: usize>(Sender<[u8; N]>);
 
 impl<const N: usize> Sink for ChannelSink<N> {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        let message = message.try_into().map_err(|error| Failure::of("message", error))?;
-        self.0.send(message).map_err(|error| Failure::of("channel", error))
+        let message = message.try_into().or_fail("message")?;
+        self.0.send(message).or_fail("channel")
     }
 }
 
@@ -45,7 +33,7 @@ struct ChannelSource<const N: usize>(Receiver<[u8; N]>);
 
 impl<const N: usize> Source for ChannelSource<N> {
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
-        message.copy_from_slice(&self.0.recv().map_err(|error| Failure::of("channel", error))?);
+        message.copy_from_slice(&self.0.recv().or_fail("channel")?);
         Ok(())
     }
 }

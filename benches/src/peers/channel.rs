@@ -1,7 +1,7 @@
 //! crossbeam's channel between two threads of one process: no shared memory, no dead peers, no priorities.
 
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
-use rohrpost_bench_local::harness::{Failure, Link};
+use rohrpost_bench_local::harness::{Failure, Link, OrFail};
 
 /// Messages that may wait; in ping-pong more than one never does.
 const DEPTH: usize = 64;
@@ -20,8 +20,8 @@ pub fn pair<const N: usize>() -> [Channel<N>; 2] {
 
 impl<const N: usize> Link for Channel<N> {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        let message = message.try_into().map_err(|error| Failure::of("message", error))?;
-        self.out.send(message).map_err(|error| Failure::of("channel", error))
+        let message = message.try_into().or_fail("message")?;
+        self.out.send(message).or_fail("channel")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {

@@ -2,10 +2,11 @@
 //! sleep.
 
 use super::iceoryx::{Service, configuration, events, failed, messages};
+use crate::one_way::{Sink, Source};
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
 use iceoryx2::port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::*;
-use rohrpost_bench_local::harness::{Failure, Scratch};
+use rohrpost_bench_local::harness::{Failure, Scratch, copy_whole};
 
 const SERVICE: &str = "stream";
 
@@ -31,12 +32,10 @@ impl IceoryxSender {
         let notifier = listens.then(|| events(&node, SERVICE)?.notifier_builder().create().map_err(failed));
         Ok(Self { publisher: publisher.map_err(failed)?, notifier: notifier.transpose()?, _node: node })
     }
+}
 
-    /// Copies a message in and sends it.
-    ///
-    /// # Errors
-    /// What iceoryx2 says.
-    pub fn publish(&mut self, message: &[u8]) -> Result<(), Failure> {
+impl Sink for IceoryxSender {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         let loan = self.publisher.loan_slice_uninit(message.len()).map_err(failed)?;
         loan.write_from_slice(message).send().map_err(failed)?;
         if let Some(notifier) = &self.notifier {
@@ -65,19 +64,13 @@ impl IceoryxReceiver {
         let listener = listens.then(|| events(&node, SERVICE)?.listener_builder().create().map_err(failed));
         Ok(Self { subscriber, listener: listener.transpose()?, _node: node })
     }
+}
 
-    /// Copies the next message out.
-    ///
-    /// # Errors
-    /// What iceoryx2 says, or when it has another length.
-    pub fn take(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+impl Source for IceoryxReceiver {
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         loop {
             if let Some(sample) = self.subscriber.receive().map_err(failed)? {
-                if sample.payload().len() != message.len() {
-                    return Err(Failure::Failed(format!("{} bytes, not {}", sample.payload().len(), message.len())));
-                }
-                message.copy_from_slice(sample.payload());
-                return Ok(());
+                return copy_whole(sample.payload(), message);
             }
             if let Some(listener) = &self.listener {
                 listener.blocking_wait(|_| {}).map_err(failed)?;

@@ -1,9 +1,9 @@
 //! A stream in each direction, for ping-pong.
 
 use super::node::{came, stamp, stream_failure};
-use rohrpost_bench_local::harness::{End, Failure, Link, Meetings};
-use rohrpost_bench_local::ours::How;
-use rohrpost_mailbox::{Name, Node, Participant, StreamId, StreamReader, StreamShape, StreamWriter, Waiting};
+use rohrpost_bench_local::harness::{End, Failure, Link, Meetings, OrFail};
+use rohrpost_bench_local::ours::{How, join, name};
+use rohrpost_mailbox::{StreamId, StreamReader, StreamShape, StreamWriter, Waiting};
 use std::path::Path;
 use std::time::Duration;
 
@@ -30,13 +30,9 @@ impl StreamLink {
     /// # Errors
     /// When the streams cannot be made.
     pub fn open(directory: &Path, end: End, bytes: usize, how: How, meetings: &mut Meetings) -> Result<Self, Failure> {
-        let record_bytes = u32::try_from(bytes).map_err(|error| Failure::of("record", error))?;
-        let (mine, other) = match end {
-            End::Ping => (Name::new(1, 1, 0, 0), Name::new(1, 2, 0, 0)),
-            End::Pong => (Name::new(1, 2, 0, 0), Name::new(1, 1, 0, 0)),
-        };
-        let node = Node::create(directory, 0o700).map_err(|error| Failure::of("node", error))?;
-        let participant = Participant::join(&node, mine).map_err(|error| Failure::of("participant", error))?;
+        let record_bytes = u32::try_from(bytes).or_fail("record")?;
+        let [mine, other] = [end, end.other()].map(name);
+        let participant = join(directory, mine)?;
         let id = |name| StreamId { name, number: 1 };
         let shape = StreamShape { record_bytes, keep: KEEP, readers: 1, late: Duration::ZERO };
         let writer = participant.stream_writer(id(mine), shape).map_err(stream_failure)?;
@@ -65,7 +61,7 @@ impl Link for StreamLink {
                 record.finish(bytes)
             }),
         };
-        written.map(drop).map_err(|error| Failure::of("write", error))
+        written.map(drop).or_fail("write")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {

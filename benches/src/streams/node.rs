@@ -1,8 +1,9 @@
 //! A node with one stream, and what its readers and writer say.
 
 use rohrpost_bench_local::harness::{Failure, Scratch};
+use rohrpost_bench_local::ours::join;
 use rohrpost_mailbox::{
-    Name, Next, Node, Participant, Stamp, StreamError, StreamId, StreamReader, StreamShape, StreamWriter,
+    Name, Next, Participant, Stamp, StreamError, StreamId, StreamReader, StreamShape, StreamWriter,
 };
 use std::sync::Arc;
 
@@ -24,9 +25,7 @@ impl StreamNode {
     }
 
     fn participant(&self) -> Result<Arc<Participant>, Failure> {
-        let node = Node::create(&self.scratch.directory().join("node"), 0o700);
-        let node = node.map_err(|error| Failure::of("node", error))?;
-        Participant::join(&node, Name::NONE).map_err(|error| Failure::of("participant", error))
+        join(&self.scratch.directory().join("node"), Name::NONE)
     }
 
     /// Makes the stream.

@@ -7,7 +7,7 @@ use super::node::{StreamNode, came, stamp};
 use crate::floors::ring::CacheLine;
 use crate::one_way::{Sink, Source};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::Zeroable;
+use rohrpost_bench_local::harness::{OrFail, Zeroable, copy_whole};
 use rohrpost_mailbox::{StreamReader, StreamWriter, Waiting};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -52,7 +52,7 @@ impl Sink for RecordSink<'_> {
             // ORDERING: Acquire; pairs with the store in `receive`: what is written over has been read.
             self.read = self.progress.0.0.load(Ordering::Acquire);
         }
-        self.writer.write(stamp(sequence), message).map(drop).map_err(|error| Failure::of("write", error))
+        self.writer.write(stamp(sequence), message).map(drop).or_fail("write")
     }
 }
 
@@ -77,10 +77,7 @@ impl Source for RecordSource<'_> {
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         let waiting = Waiting { spin: SPIN, deadline: None };
         let info = came(self.reader.next_timeout_into(&mut self.body, waiting))?;
-        if info.len_bytes != message.len() {
-            return Err(Failure::Failed(format!("a record of {} bytes, not {}", info.len_bytes, message.len())));
-        }
-        message.copy_from_slice(&self.body);
+        copy_whole(&self.body, message)?;
         let read = info.sequence + 1;
         if read.is_multiple_of(TELL_EACH) {
             // ORDERING: Release; pairs with the load in `send`.

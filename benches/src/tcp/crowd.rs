@@ -11,7 +11,7 @@ use super::tally::Tally;
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use nix::sys::timerfd::TimerFd;
-use rohrpost_bench_local::harness::{Child, End, Failure, Placement, Scheduling, Shared, interrupted, settle};
+use rohrpost_bench_local::harness::{Child, End, Failure, OrFail, Placement, Scheduling, Shared, look_for, settle};
 use rohrpost_mailbox::monotonic_ns;
 use std::time::{Duration, Instant};
 
@@ -115,24 +115,10 @@ impl Crowd {
     }
 
     fn await_until(&mut self, patience: Duration, is_so: impl Fn(&Tally) -> bool) -> Result<(), Failure> {
-        let give_up = Instant::now() + patience;
-        while !is_so(&self.tally) {
-            if interrupted() {
-                return Err(Failure::Failed("interrupted".into()));
-            }
-            if !self.is_there()? {
-                return Ok(());
-            }
-            if Instant::now() > give_up {
-                return Err(Failure::Failed(format!(
-                    "{} of {} sessions are there",
-                    self.tally.up.get(),
-                    self.habits.guests
-                )));
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        Ok(())
+        let look = || Ok((is_so(&self.tally) || !self.is_there()?).then_some(()));
+        let so = look_for(patience, Duration::from_millis(5), look)?;
+        let up = self.tally.up.get();
+        so.ok_or_else(|| Failure::Failed(format!("{up} of {} sessions are there", self.habits.guests)))
     }
 }
 
@@ -152,10 +138,10 @@ struct Work<'a> {
 impl<'a> Work<'a> {
     fn new(systems: &Systems, tally: &'a Tally, habits: Habits) -> Result<Self, Failure> {
         raise_descriptors(u64::from(habits.guests) + DESCRIPTORS_BESIDE);
-        let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|error| Failure::of("epoll", error))?;
-        let timer = ticks().map_err(|error| Failure::of("timer", error))?;
+        let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).or_fail("epoll")?;
+        let timer = ticks().or_fail("timer")?;
         let watched = epoll.add(&timer, EpollEvent::new(EpollFlags::EPOLLIN, TIMER));
-        watched.map_err(|error| Failure::of("epoll", error))?;
+        watched.or_fail("epoll")?;
         let (address, common, seal) = (systems.address(), systems.common(), systems.seal()?);
         let counted = habits.per_s * habits.counted.as_millis() as u64 / 1000;
         let sampled_each = counted.div_ceil(SAMPLES).max(1);
@@ -236,7 +222,7 @@ impl<'a> Work<'a> {
         let count = self.house.epoll.wait(&mut events, EpollTimeout::NONE).unwrap_or(0);
         for event in &events[..count] {
             if event.data() == TIMER {
-                self.timer.wait().map_err(|error| Failure::of("timer", error))?;
+                self.timer.wait().or_fail("timer")?;
             } else if let Some(guest) = self.guests.get_mut(event.data() as usize) {
                 guest.happened(&self.house, event.events(), &mut self.piece)?;
             }

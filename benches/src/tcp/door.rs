@@ -2,9 +2,9 @@
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use rohrpost_bench_local::hand_over::{HandOver, Lanes, Wake};
-use rohrpost_bench_local::harness::{End, Failure, Link, Shared};
-use rohrpost_bench_local::ours::Station;
-use rohrpost_mailbox::{Interest, Name, Node, Participant, Receiver, Shape, Waiting, Watches};
+use rohrpost_bench_local::harness::{End, Failure, Link, OrFail, Shared};
+use rohrpost_bench_local::ours::{Station, join, shape};
+use rohrpost_mailbox::{Interest, Name, Receiver, Waiting, Watches};
 use std::fs::File;
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -48,7 +48,7 @@ pub(super) struct Hall {
 
 impl Hall {
     pub(super) fn new() -> Result<Self, Failure> {
-        Ok(Self { lanes: Shared::new()?, pipe: nix::unistd::pipe().map_err(|error| Failure::of("pipe", error))? })
+        Ok(Self { lanes: Shared::new()?, pipe: nix::unistd::pipe().or_fail("pipe")? })
     }
 
     /// For the relay.
@@ -65,18 +65,18 @@ impl Hall {
 }
 
 fn file(descriptor: &OwnedFd) -> Result<File, Failure> {
-    descriptor.try_clone().map(File::from).map_err(|error| Failure::of("pipe", error))
+    descriptor.try_clone().map(File::from).or_fail("pipe")
 }
 
 impl Door for BareRelayModule<'_> {
     fn wait(&mut self, socket: &mut TcpStream) -> Result<bool, Failure> {
         let watched = [self.out.as_fd(), socket.as_fd()];
         let mut waits = watched.map(|descriptor| PollFd::new(descriptor, PollFlags::POLLIN));
-        poll(&mut waits, PollTimeout::NONE).map_err(|error| Failure::of("poll", error))?;
+        poll(&mut waits, PollTimeout::NONE).or_fail("poll")?;
         let [from_module, from_network] = waits.map(|wait| wait.any().unwrap_or(true));
         if from_module {
-            let count = self.out.read(&mut self.piece).map_err(|error| Failure::of("pipe", error))?;
-            socket.write_all(&self.piece[..count]).map_err(|error| Failure::of("write", error))?;
+            let count = self.out.read(&mut self.piece).or_fail("pipe")?;
+            socket.write_all(&self.piece[..count]).or_fail("write")?;
         }
         Ok(from_network)
     }
@@ -94,7 +94,7 @@ pub(super) struct DoorModule<'a> {
 
 impl Link for DoorModule<'_> {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.into.write_all(message).map_err(|error| Failure::of("pipe", error))
+        self.into.write_all(message).or_fail("pipe")
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
@@ -112,14 +112,10 @@ pub(super) struct MailboxDoor {
 impl MailboxDoor {
     /// For the relay, on the node in this directory.
     pub(super) fn open(directory: &Path, socket: &TcpStream, bytes: usize) -> Result<Self, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::of("mailbox", error);
-        let body_bytes_max = u16::try_from(bytes).map_err(|error| failed(&error))?;
-        let node = Node::create(directory, 0o700).map_err(|error| failed(&error))?;
-        let participant = Participant::join(&node, RELAY).map_err(|error| failed(&error))?;
-        let shape = Shape { body_bytes_max, ..Shape::default() };
-        let receiver = participant.receiver(RELAY, shape).map_err(|error| failed(&error))?;
-        let mut watches = Watches::new(&participant).map_err(|error| failed(&error))?;
-        watches.add(socket, Interest::Read).map_err(|error| failed(&error))?;
+        let participant = join(directory, RELAY)?;
+        let receiver = participant.receiver(RELAY, shape(bytes)?).or_fail("mailbox")?;
+        let mut watches = Watches::new(&participant).or_fail("mailbox")?;
+        watches.add(socket, Interest::Read).or_fail("mailbox")?;
         Ok(Self { receiver, watches, back: Station::open(directory, None, MODULE, bytes)? })
     }
 
@@ -133,7 +129,7 @@ impl Door for MailboxDoor {
     fn wait(&mut self, socket: &mut TcpStream) -> Result<bool, Failure> {
         self.watches.wait_any(&mut [&mut self.receiver], Waiting::default(), || false);
         while let Some(package) = self.receiver.try_receive() {
-            socket.write_all(package.body()).map_err(|error| Failure::of("write", error))?;
+            socket.write_all(package.body()).or_fail("write")?;
         }
         Ok(self.watches.next_ready().is_some())
     }

@@ -3,7 +3,7 @@
 use super::systems::{guest, system_of};
 use super::tally::Tally;
 use nix::sys::epoll::{Epoll, EpollEvent, EpollFlags};
-use rohrpost_bench_local::harness::{End, Failure};
+use rohrpost_bench_local::harness::{End, Failure, OrFail};
 use rohrpost_mailbox::{Head, Name, Options, Priority, Type, monotonic_ns};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;
@@ -96,11 +96,11 @@ impl Guest {
         let now_ns = monotonic_ns();
         let Some(stream) = &mut self.stream else { return Ok(()) };
         if self.is_begun && flags.contains(EpollFlags::EPOLLOUT) {
-            stream.connected().map_err(|error| Failure::of("connect", error))?;
+            stream.connected().or_fail("connect")?;
             self.is_begun = false;
             self.client.connected(now_ns);
         } else if flags.contains(EpollFlags::EPOLLOUT) {
-            stream.flush().map_err(|error| Failure::of("write", error))?;
+            stream.flush().or_fail("write")?;
             if !stream.has_unsent() {
                 self.await_room(house, false)?;
                 self.client.writable();
@@ -127,10 +127,9 @@ impl Guest {
 
     fn connect(&mut self, house: &House<'_>) -> Result<(), Failure> {
         let sealed = house.seal.as_ref().map(ClientSeal::begin).transpose();
-        let stream = sealed.and_then(|sealed| Stream::connect(house.address, sealed));
-        let stream = stream.map_err(|error| Failure::of("connect", error))?;
+        let stream = sealed.and_then(|sealed| Stream::connect(house.address, sealed)).or_fail("connect")?;
         let event = EpollEvent::new(EpollFlags::EPOLLIN | EpollFlags::EPOLLOUT, self.index.into());
-        house.epoll.add(&stream, event).map_err(|error| Failure::of("epoll", error))?;
+        house.epoll.add(&stream, event).or_fail("epoll")?;
         (self.stream, self.is_begun, self.awaits_room) = (Some(stream), true, true);
         Ok(())
     }
@@ -138,7 +137,7 @@ impl Guest {
     fn read(&mut self, house: &House<'_>, piece: &mut [u8]) -> Result<(), Failure> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
         match stream.read(piece) {
-            Moved::Nothing => stream.flush().map_err(|error| Failure::of("write", error)),
+            Moved::Nothing => stream.flush().or_fail("write"),
             Moved::Over(error) => {
                 let why = error.map_or_else(String::new, |error| error.to_string());
                 Err(Failure::Failed(format!("guest {}: the TCP router closed the connection: {why}", self.index)))
@@ -174,7 +173,7 @@ impl Guest {
         self.awaits_room = awaits;
         let room = if awaits { EpollFlags::EPOLLOUT } else { EpollFlags::empty() };
         let mut event = EpollEvent::new(EpollFlags::EPOLLIN | room, self.index.into());
-        house.epoll.modify(stream, &mut event).map_err(|error| Failure::of("epoll", error))
+        house.epoll.modify(stream, &mut event).or_fail("epoll")
     }
 }
 

@@ -11,7 +11,7 @@ use super::door::{Door, Hall, MailboxDoor};
 use super::systems::free_address;
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use rohrpost_bench_local::harness::{
-    Cell, Child, End, Failure, Gate, Link, Scratch, Shared, settle, time_two_processes,
+    Cell, Child, End, Failure, Gate, Link, OrFail, Scratch, Shared, settle, time_two_processes,
 };
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -29,7 +29,7 @@ const PIECE_BYTES: usize = 64 * 1024;
 /// What a relay failed with, else an end.
 pub fn time_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
     let halls = [Hall::new()?, Hall::new()?];
-    let hall = |end| &halls[usize::from(end == End::Pong)];
+    let hall = |end: End| &halls[end.index()];
     time(cell, |end, _| hall(end).door(), |end| hall(end).module())
 }
 
@@ -40,7 +40,7 @@ pub fn time_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
 /// As [`time_relays`].
 pub fn time_mailbox_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
-    let directory = |end| scratch.directory().join(if end == End::Ping { "near" } else { "far" });
+    let directory = |end: End| scratch.directory().join(end.node());
     let door = |end, socket: &TcpStream| MailboxDoor::open(&directory(end), socket, cell.bytes);
     time(cell, door, |end| MailboxDoor::module(&directory(end), cell.bytes))
 }
@@ -82,7 +82,7 @@ fn relay(mut door: impl Door, mut socket: TcpStream, bytes: usize) -> Result<(),
         if !door.wait(&mut socket)? {
             continue;
         }
-        let count = socket.read(&mut piece).map_err(|error| Failure::of("outer relay", error))?;
+        let count = socket.read(&mut piece).or_fail("outer relay")?;
         message.extend_from_slice(&piece[..count]);
         if count == 0 {
             return Err(Failure::Failed("the middle relay has gone".into()));
@@ -96,27 +96,26 @@ fn relay(mut door: impl Door, mut socket: TcpStream, bytes: usize) -> Result<(),
 
 /// In the middle, as the TCP router.
 fn middle(address: SocketAddr, gate: &Gate) -> Result<(), Failure> {
-    let failed = |error: io::Error| Failure::of("middle relay", error);
-    let listener = TcpListener::bind(address).map_err(failed)?;
-    let mut sockets = [accept(&listener).map_err(failed)?, accept(&listener).map_err(failed)?];
+    let listener = TcpListener::bind(address).or_fail("middle relay")?;
+    let mut sockets = [accept(&listener).or_fail("middle relay")?, accept(&listener).or_fail("middle relay")?];
     sockets.sort_by_key(|(end, _)| *end);
     let mut sockets = sockets.map(|(_, socket)| socket);
-    let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|error| failed(error.into()))?;
+    let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).or_fail("middle relay")?;
     for (socket, index) in sockets.iter().zip(0..) {
         let added = epoll.add(socket, EpollEvent::new(EpollFlags::EPOLLIN, index));
-        added.map_err(|error| failed(error.into()))?;
+        added.or_fail("middle relay")?;
     }
     let (mut piece, mut events) = (vec![0; PIECE_BYTES], [EpollEvent::empty(); 2]);
     gate.meet(ALL)?;
     loop {
-        let count = epoll.wait(&mut events, EpollTimeout::NONE).map_err(|error| failed(error.into()))?;
+        let count = epoll.wait(&mut events, EpollTimeout::NONE).or_fail("middle relay")?;
         for event in &events[..count] {
             let from = event.data() as usize;
-            let bytes = sockets[from].read(&mut piece).map_err(failed)?;
+            let bytes = sockets[from].read(&mut piece).or_fail("middle relay")?;
             if bytes == 0 {
                 return Err(Failure::Failed("an outer relay has gone".into()));
             }
-            sockets[1 - from].write_all(&piece[..bytes]).map_err(failed)?;
+            sockets[1 - from].write_all(&piece[..bytes]).or_fail("middle relay")?;
         }
     }
 }
@@ -141,6 +140,6 @@ fn reach(address: SocketAddr, end: End) -> Result<TcpStream, Failure> {
         }
     };
     let told = socket.set_nodelay(true).and_then(|()| socket.write_all(&[u8::from(end == End::Pong)]));
-    told.map_err(|error| Failure::of("outer relay", error))?;
+    told.or_fail("outer relay")?;
     Ok(socket)
 }

@@ -2,7 +2,7 @@
 
 use super::pace::Pace;
 use nix::sys::socket::{setsockopt, sockopt};
-use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::harness::{Failure, OrFail};
 use rohrpost_routers::session::frame::SessionMessage;
 use rohrpost_routers::tcp::{Moved, Stream};
 
@@ -25,7 +25,7 @@ pub(super) struct Stalled {
 
 impl Stalled {
     pub(super) fn new(stream: Stream, now_ns: u64) -> Result<Self, Failure> {
-        setsockopt(&stream, sockopt::RcvBuf, &KEPT_BYTES).map_err(|error| Failure::of("receive buffer", error))?;
+        setsockopt(&stream, sockopt::RcvBuf, &KEPT_BYTES).or_fail("receive buffer")?;
         let (packages, signs) = (Pace::new(now_ns, EACH_NS), Pace::new(now_ns, ALIVE_EACH_NS));
         Ok(Self { stream, packages, signs, body: [0; BYTES], sent: 0 })
     }

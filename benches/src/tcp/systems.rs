@@ -1,7 +1,8 @@
 //! Two systems that meet at a TCP router, each a single node: real processes, as launch would start them.
 
+use crate::lan::router::make_keys;
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, End, Placement, Scheduling, Scratch, interrupted, settle};
+use rohrpost_bench_local::harness::{Child, End, OrFail, Placement, Scheduling, Scratch, look_for, settle};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Class, Name, node_directory};
@@ -12,7 +13,7 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const INSTALLATION: &str = "bench-tcp";
 /// Class of what is timed.
@@ -58,13 +59,15 @@ impl Systems {
         let address = free_address()?;
         for end in [End::Ping, End::Pong] {
             let text = configuration(end, security, address);
-            fs::write(config(&scratch, end), text).map_err(|error| Failure::of("configuration", error))?;
+            fs::write(config(&scratch, end), text).or_fail("configuration")?;
         }
         let installation = Installation::load(&config(&scratch, End::Ping));
-        let common = installation.map_err(|errors| Failure::of("configuration", errors))?.digest().common;
+        let common = installation.or_fail("configuration")?.digest().common;
         let mut systems = Self { processes: Vec::new(), command, security, address, common, scratch };
         if security == Security::Tls {
-            [End::Ping, End::Pong].into_iter().try_for_each(|end| systems.certify(end))?;
+            for end in [End::Ping, End::Pong] {
+                make_keys(&systems.command, &systems.configuration(end))?;
+            }
         }
         systems.launch("tcp-router", "tcp.255", End::Ping, End::Pong)?;
         systems.await_ready(|_| Ok(TcpStream::connect(address).is_ok()))?;
@@ -115,14 +118,14 @@ impl Systems {
     /// # Errors
     /// When the certificates are no good.
     pub fn seal(&self) -> Result<Option<ClientSeal>, Failure> {
-        let holder = Holder::Node { node: name_of(End::Pong).into(), system: system_of(End::Pong) };
+        let holder = Holder::Node { node: End::Pong.node().into(), system: system_of(End::Pong) };
         let load = || ClientSeal::load(&self.scratch.directory().join("certificates"), &holder);
-        (self.security == Security::Tls).then(load).transpose().map_err(|error| Failure::of("certificates", error))
+        (self.security == Security::Tls).then(load).transpose().or_fail("certificates")
     }
 
     /// The directory of an end's node.
     pub fn directory(&self, end: End) -> PathBuf {
-        let file = node_directory(INSTALLATION, name_of(end));
+        let file = node_directory(INSTALLATION, end.node());
         self.scratch.directory().join(file.file_name().unwrap_or_default())
     }
 
@@ -139,17 +142,10 @@ impl Systems {
         Ok(())
     }
 
-    fn certify(&self, end: End) -> Result<(), Failure> {
-        let made = Command::new(&self.command).args(["keys", "new"]).arg(config(&self.scratch, end)).output();
-        let made = made.map_err(|error| Failure::of("rohrpost keys new", error))?;
-        let said = || Failure::of("rohrpost keys new", String::from_utf8_lossy(&made.stderr));
-        if made.status.success() { Ok(()) } else { Err(said()) }
-    }
-
     fn launch(&mut self, what: &str, name: &str, end: End, place: End) -> Result<(), Failure> {
-        let log = self.scratch.directory().join(format!("{what}-{}.log", name_of(end)));
+        let log = self.scratch.directory().join(format!("{what}-{}.log", end.node()));
         let child = Child::start(|| {
-            let log = fs::File::create(&log).map_err(|error| Failure::of("log", error))?;
+            let log = fs::File::create(&log).or_fail("log")?;
             settle(place, Placement::TwoCores, Scheduling::Fifo)?;
             let error = Command::new(&self.command)
                 .args([what, "--name", name, "--config"])
@@ -166,16 +162,12 @@ impl Systems {
     }
 
     fn await_ready(&mut self, is_ready: impl Fn(&Self) -> Result<bool, Failure>) -> Result<(), Failure> {
-        let give_up = Instant::now() + READY_WITHIN;
-        while !is_ready(self)? {
+        let ready = look_for(READY_WITHIN, LOOK_EACH, || {
             self.check()?;
-            if Instant::now() > give_up || interrupted() {
-                let said: String = self.processes.iter().map(Process::said).collect();
-                return Err(Failure::Failed(format!("the systems did not get ready: {said}")));
-            }
-            std::thread::sleep(LOOK_EACH);
-        }
-        Ok(())
+            Ok(is_ready(self)?.then_some(()))
+        })?;
+        let said = || self.processes.iter().map(Process::said).collect::<String>();
+        ready.ok_or_else(|| Failure::Failed(format!("the systems did not get ready: {}", said())))
     }
 
     /// As a user would ask.
@@ -193,7 +185,7 @@ impl Systems {
             .arg(config(&self.scratch, end))
             .env("ROHRPOST_DIR", self.scratch.directory())
             .output();
-        let output = asked.map_err(|error| Failure::of("rohrpost net", error))?;
+        let output = asked.or_fail("rohrpost net")?;
         // The file is empty until the client writes.
         let told: Vec<StatusJson> = serde_json::from_slice(&output.stdout).unwrap_or_default();
         Ok(told.into_iter().filter_map(|told| told.beyond).any(|beyond| beyond.state == "up"))
@@ -223,12 +215,8 @@ pub fn guest(index: u16) -> Name {
     Name::new(system_of(End::Pong), BENCH.0, instance, local)
 }
 
-fn name_of(end: End) -> &'static str {
-    if end == End::Ping { "near" } else { "far" }
-}
-
 fn config(scratch: &Scratch, end: End) -> PathBuf {
-    Path::new(&scratch.directory()).join(format!("{}.toml", name_of(end)))
+    Path::new(&scratch.directory()).join(format!("{}.toml", end.node()))
 }
 
 /// A free port of a loopback address of this process alone: nobody else connects from there, and so takes the port
@@ -238,11 +226,11 @@ pub fn free_address() -> Result<SocketAddr, Failure> {
     // 127.128.0.0/9 without its first and last addresses; a PID has 22 bits.
     let own = Ipv4Addr::new(127, 128 | high, middle, low.clamp(1, 254));
     let found = TcpListener::bind((own, 0)).and_then(|listener| listener.local_addr());
-    found.map_err(|error| Failure::of("a free port", error))
+    found.or_fail("a free port")
 }
 
 fn configuration(end: End, security: Security, at: SocketAddr) -> String {
-    let (node, system) = (name_of(end), system_of(end));
+    let (node, system) = (end.node(), system_of(end));
     let security = match security {
         Security::None => "security = \"none\"",
         Security::Tls => "security = \"tls\"\ncertificates = \"certificates\"",

@@ -2,13 +2,13 @@
 //! only compiled on demand.
 
 use super::systems::free_address;
-use rohrpost_bench_local::harness::{Cell, Child, Failure, Scratch, interrupted};
+use rohrpost_bench_local::harness::{Cell, Child, Failure, OrFail, Scratch, look_for};
 use std::fs::{self, File};
 use std::net::{SocketAddr, TcpStream};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The program; it stands beside this one.
 pub const PROGRAM: &str = "rohrpost-bench-zenoh";
@@ -34,20 +34,17 @@ pub fn time_zenoh(cell: &Cell) -> Result<Vec<f64>, Failure> {
     let cap_ms = cell.cap.as_millis().to_string();
     let arguments = ["ping", &locator, &bytes, &messages, &warm_up, &cap_ms];
     let mut ping = start(&program, &arguments, &scratch, "ping")?;
-    let give_up = Instant::now() + cell.cap + GRACE;
-    while !ping.has_ended()? && Instant::now() < give_up && !interrupted() {
-        std::thread::sleep(LOOK_EACH);
-    }
+    look_for(cell.cap + GRACE, LOOK_EACH, || Ok(ping.has_ended()?.then_some(())))?;
     let said = fs::read_to_string(said(&scratch, "ping")).unwrap_or_default();
     let mut lines: Vec<&str> = said.lines().collect();
     if lines.pop() != Some(END) {
         return Err(Failure::Failed(format!("zenoh's ping did not end: {said}")));
     }
-    lines.iter().map(|line| line.parse::<f64>().map_err(|error| Failure::of(line, error))).collect()
+    lines.iter().map(|line| line.parse::<f64>().or_fail(line)).collect()
 }
 
 fn program() -> Result<PathBuf, Failure> {
-    let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+    let own = std::env::current_exe().or_fail("this program")?;
     let path = own.with_file_name(PROGRAM);
     let how = "cargo build --release --manifest-path benches/zenoh/Cargo.toml --target-dir target";
     if path.is_file() { Ok(path) } else { Err(Failure::Skipped(format!("no {}; {how}", path.display()))) }
@@ -55,8 +52,8 @@ fn program() -> Result<PathBuf, Failure> {
 
 fn start(program: &Path, arguments: &[&str], scratch: &Scratch, name: &str) -> Result<Child, Failure> {
     Child::start(|| {
-        let said = File::create(said(scratch, name)).map_err(|error| Failure::of(name, error))?;
-        let errors = said.try_clone().map_err(|error| Failure::of(name, error))?;
+        let said = File::create(said(scratch, name)).or_fail(name)?;
+        let errors = said.try_clone().or_fail(name)?;
         let error = Command::new(program).args(arguments).stdin(Stdio::null()).stdout(said).stderr(errors).exec();
         Err(Failure::of(PROGRAM, error))
     })
@@ -67,12 +64,6 @@ fn said(scratch: &Scratch, name: &str) -> PathBuf {
 }
 
 fn await_listening(address: SocketAddr) -> Result<(), Failure> {
-    let give_up = Instant::now() + READY_WITHIN;
-    while TcpStream::connect(address).is_err() {
-        if Instant::now() > give_up || interrupted() {
-            return Err(Failure::Failed("zenoh's router does not listen".into()));
-        }
-        std::thread::sleep(LOOK_EACH);
-    }
-    Ok(())
+    let listens = look_for(READY_WITHIN, LOOK_EACH, || Ok(TcpStream::connect(address).ok()))?;
+    listens.map(drop).ok_or_else(|| Failure::Failed("zenoh's router does not listen".into()))
 }

@@ -1,7 +1,7 @@
 //! What routers report of their slots, by `rohrpost net`, as for a user.
 
 use super::stage::{NODES, Place};
-use rohrpost_bench_local::harness::{Failure, interrupted};
+use rohrpost_bench_local::harness::{Failure, OrFail, interrupted};
 use serde::Deserialize;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -84,7 +84,7 @@ fn ask_all(command: &Path, config: &Path, scratch: &Path) -> Result<Vec<Counts>,
         let mut asked = Command::new(command);
         asked.args(["net", "--json", "--node", &Place::Node(node).name(), "--config"]).arg(config);
         asked.env("ROHRPOST_DIR", scratch).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        asked.spawn().map_err(|error| Failure::of("rohrpost net", error))
+        asked.spawn().or_fail("rohrpost net")
     };
     // All at the same time.
     let asked = (0..NODES).map(ask).collect::<Result<Vec<_>, Failure>>()?;
@@ -93,10 +93,10 @@ fn ask_all(command: &Path, config: &Path, scratch: &Path) -> Result<Vec<Counts>,
 }
 
 fn answer(asked: Child) -> Result<Counts, Failure> {
-    let output = asked.wait_with_output().map_err(|error| Failure::of("rohrpost net", error))?;
+    let output = asked.wait_with_output().or_fail("rohrpost net")?;
     let said = || format!("rohrpost net: {}", String::from_utf8_lossy(&output.stderr));
     // It fails if a peer is silent, which does not matter here.
-    let told: Vec<StatusJson> = serde_json::from_slice(&output.stdout).map_err(|error| Failure::of(&said(), error))?;
+    let told: Vec<StatusJson> = serde_json::from_slice(&output.stdout).or_fail(&said())?;
     let told = told.into_iter().next().ok_or_else(|| Failure::Failed(said()))?;
     told.slots.ok_or_else(|| Failure::Failed(told.failure.unwrap_or_else(said)))
 }

@@ -2,7 +2,7 @@
 
 use libc::{BPF_ABS, BPF_B, BPF_H, BPF_JEQ, BPF_JMP, BPF_K, BPF_LD, BPF_RET, sock_filter, sock_fprog};
 use nix::sys::socket::{AddressFamily, SockFlag, SockProtocol, SockType, setsockopt, socket, sockopt};
-use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::{Failure, OrFail};
 use std::io;
 use std::os::fd::{AsRawFd, OwnedFd};
 
@@ -14,13 +14,12 @@ const RECEIVE_BYTES: usize = 64 << 20;
 /// # Errors
 /// When the system refuses it.
 pub fn open(ports: [u16; 2]) -> Result<OwnedFd, Failure> {
-    let failed = |error: nix::Error| Failure::of("packet socket", error);
-    let socket = socket(AddressFamily::Packet, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::EthAll);
-    let socket = socket.map_err(failed)?;
-    attach(&socket, &mut program(ports)).map_err(|error| Failure::of("filter of a packet socket", error))?;
+    let socket = socket(AddressFamily::Packet, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::EthAll)
+        .or_fail("packet socket")?;
+    attach(&socket, &mut program(ports)).or_fail("filter of a packet socket")?;
     // Only root may exceed the system's limit; other users keep the limit.
     let _ = setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES);
-    setsockopt(&socket, sockopt::ReceiveTimestampns, &true).map_err(failed)?;
+    setsockopt(&socket, sockopt::ReceiveTimestampns, &true).or_fail("packet socket")?;
     Ok(socket)
 }
 

@@ -3,7 +3,7 @@
 use super::stage::{NODES, Place};
 use crate::lan::records::{self, RECORDS};
 use crate::lan::router::{ROUTER, SYSTEM};
-use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::{Failure, OrFail};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Class, Name, StreamShape};
 use rohrpost_routers::settings::Settings;
@@ -86,8 +86,7 @@ impl Plan {
     /// # Errors
     /// What is wrong with the plan, as `rohrpost check` says it.
     pub fn installation(&self) -> Result<Installation, Failure> {
-        Installation::parse(&self.text(), Path::new("bench-tdma.toml"))
-            .map_err(|error| Failure::of("configuration", error))
+        Installation::parse(&self.text(), Path::new("bench-tdma.toml")).or_fail("configuration")
     }
 
     /// The slots, as a node reads them.
@@ -96,8 +95,7 @@ impl Plan {
     /// As [`Self::installation`].
     pub fn table(&self, own: u8) -> Result<SlotTable, Failure> {
         let installation = self.installation()?;
-        let settings = Settings::new(&installation, &Place::Node(own).name(), 1)
-            .map_err(|error| Failure::of("configuration", error))?;
+        let settings = Settings::new(&installation, &Place::Node(own).name(), 1).or_fail("configuration")?;
         let tdma = installation.tdma.as_ref().ok_or_else(|| Failure::Failed("a plan without slots".into()))?;
         Ok(SlotTable::new(tdma, installation.time.masters(), own, NODES, settings.overhead_bytes()))
     }

@@ -3,8 +3,9 @@
 use super::plan::replica_of;
 use super::routers::Routers;
 use super::stage::NODES;
-use crate::lan::flow::{FILLER, Inlet, Outlet, checked, put_number};
+use crate::lan::flow::{FILLER, Outlet, checked, put_number};
 use crate::lan::records::{self, RecordInlet, RecordOutlet};
+use crate::one_way::Sink;
 use rohrpost_bench_local::Failure;
 use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable};
 use rohrpost_mailbox::StreamShape;

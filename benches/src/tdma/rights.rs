@@ -1,7 +1,7 @@
 //! Scheduling that the routers' process may ask the kernel for.
 
 use nix::sys::resource::{Resource, setrlimit};
-use rohrpost_bench_local::Failure;
+use rohrpost_bench_local::{Failure, OrFail};
 use std::io;
 
 /// How a router may be scheduled.
@@ -25,7 +25,7 @@ impl Rights {
         if self == Self::RealTime {
             return Ok(());
         }
-        setrlimit(Resource::RLIMIT_RTPRIO, 0, 0).map_err(|error| Failure::of("limit of real-time priority", error))?;
+        setrlimit(Resource::RLIMIT_RTPRIO, 0, 0).or_fail("limit of real-time priority")?;
         // SAFETY: changes the rights after an exec, and touches no memory.
         match unsafe { libc::prctl(libc::PR_CAPBSET_DROP, CAP_SYS_NICE, 0, 0, 0) } {
             0 => Ok(()),

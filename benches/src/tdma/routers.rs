@@ -7,12 +7,12 @@ use super::rights::Rights;
 use super::stage::{NODES, Place, Stage};
 use crate::lan::router::{Router, RouterSpec, end_all};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Machine, Scratch, interrupted};
+use rohrpost_bench_local::harness::{Machine, OrFail, Scratch, look_for};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{Node, SystemClock};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A joining node listens to some cycles and measures; ordinary processes on busy processors take longer.
 const SENDS_WITHIN: Duration = Duration::from_secs(60);
@@ -42,7 +42,7 @@ impl<'a> Routers<'a> {
         // Without it, three routers report the same.
         plan.installation()?;
         let config = scratch.directory().join("bench-tdma.toml");
-        fs::write(&config, plan.text()).map_err(|error| Failure::of("configuration", error))?;
+        fs::write(&config, plan.text()).or_fail("configuration")?;
         let mut all = Self { stage, scratch, command, config, rights, routers: Vec::new() };
         for node in 0..NODES {
             let router = all.launch(node)?;
@@ -87,7 +87,7 @@ impl<'a> Routers<'a> {
     /// # Errors
     /// When it has none.
     pub fn clock(&self, node: u8) -> Result<SystemClock, Failure> {
-        let node = Node::open(&self.directory(node)).map_err(|error| Failure::of("node", error))?;
+        let node = Node::open(&self.directory(node)).or_fail("node")?;
         Ok(SystemClock::open(&node))
     }
 
@@ -104,32 +104,23 @@ impl<'a> Routers<'a> {
         Machine::look(&self.routers.iter().map(Router::pid).collect::<Vec<_>>(), SLOTS_THREAD)
     }
 
-    /// Waits until each of these nodes has sent some more packages.
+    /// Waits until each node has sent some more packages.
     ///
     /// # Errors
     /// What the others report, if one does not.
-    pub fn await_packages(&self, nodes: &[u8], capture: &mut Capture) -> Result<(), Failure> {
+    pub fn await_packages(&self, capture: &mut Capture) -> Result<(), Failure> {
         let from = capture.len();
-        let give_up = Instant::now() + SENDS_WITHIN;
-        loop {
+        let all = look_for(SENDS_WITHIN, LOOK_EACH, || {
             capture.check()?;
             let frames = capture.since(from);
-            let sends = |node: &u8| {
-                let its = frames.iter().filter(|frame| frame.from == *node && frame.what == FrameKind::Packages);
+            let sends = |node| {
+                let its = frames.iter().filter(|frame| frame.from == node && frame.what == FrameKind::Packages);
                 its.take(FRAMES).count() == FRAMES
             };
-            if nodes.iter().all(sends) {
-                return Ok(());
-            }
-            if interrupted() {
-                return Err(Failure::Failed("interrupted".into()));
-            }
-            if Instant::now() > give_up {
-                let said: String = self.routers.iter().map(Router::said).collect();
-                return Err(Failure::Failed(format!("a node does not send in its slots: {said}")));
-            }
-            std::thread::sleep(LOOK_EACH);
-        }
+            Ok((0..NODES).all(sends).then_some(()))
+        })?;
+        let said = || self.routers.iter().map(Router::said).collect::<String>();
+        all.ok_or_else(|| Failure::Failed(format!("a node does not send in its slots: {}", said())))
     }
 }
 

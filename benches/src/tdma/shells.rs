@@ -6,7 +6,7 @@ use super::stage::{NODES, Place, Stage};
 use crate::lan::router::{ROUTER, SYSTEM};
 use crate::lan::skewed::{SKEW, Shown};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::Scratch;
+use rohrpost_bench_local::harness::{OrFail, Scratch, look_for};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, monotonic_ns, realtime_ns};
 use rohrpost_routers::settings::Settings;
@@ -14,7 +14,7 @@ use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
 use rohrpost_routers::time::Role;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// As many exchanges as the filter of a clock holds.
 const SETTLED: u64 = 64;
@@ -58,24 +58,14 @@ impl Shells {
     /// # Errors
     /// What they show, if one does not.
     pub fn await_settled(&self) -> Result<u8, Failure> {
-        let give_up = Instant::now() + SETTLES_WITHIN;
-        loop {
-            if let Some(master) = self.master()
-                && self
-                    .members
-                    .iter()
-                    .enumerate()
-                    .all(|(node, member)| node == usize::from(master) || member.is_settled())
-            {
-                return Ok(master);
-            }
-            if Instant::now() > give_up {
-                let shells = self.members.iter().filter_map(|member| member.shell.as_ref()?.clock());
-                let seen: Vec<_> = shells.map(|clock| clock.snapshot()).collect();
-                return Err(Failure::Failed(format!("a slave has no time: {seen:?}")));
-            }
-            std::thread::sleep(LOOK_EACH);
-        }
+        let settled =
+            |master: &u8| (0..).zip(&self.members).all(|(node, member)| node == *master || member.is_settled());
+        let master = look_for(SETTLES_WITHIN, LOOK_EACH, || Ok(self.master().filter(settled)))?;
+        master.ok_or_else(|| {
+            let shells = self.members.iter().filter_map(|member| member.shell.as_ref()?.clock());
+            let seen: Vec<_> = shells.map(|clock| clock.snapshot()).collect();
+            Failure::Failed(format!("a slave has no time: {seen:?}"))
+        })
     }
 
     /// The node that takes itself for the master, if there is exactly one.
@@ -107,10 +97,8 @@ impl Member {
     fn start(stage: &Stage, installation: &Installation, own: u8, scratch: &Scratch) -> Result<Self, Failure> {
         let place = Place::Node(own);
         stage.enter(place)?;
-        let node = Node::create(&scratch.directory().join(place.name()), 0o700);
-        let node = node.map_err(|error| Failure::of("node", error))?;
-        let settings = Settings::new(installation, &place.name(), realtime_ns());
-        let settings = settings.map_err(|error| Failure::of("configuration", error))?;
+        let node = Node::create(&scratch.directory().join(place.name()), 0o700).or_fail("node")?;
+        let settings = Settings::new(installation, &place.name(), realtime_ns()).or_fail("configuration")?;
         let skew = if own == 0 {
             Skew::default()
         } else {
@@ -123,7 +111,7 @@ impl Member {
         let name = Name::new(SYSTEM, ROUTER.0, own, 0);
         let faults = Arc::new(Silence);
         let parts = Parts { node: &node, name, settings, faults, sockets: Vec::new(), impair: None, clock };
-        let shell = Shell::start(parts).map_err(|error| Failure::of("router", error))?;
+        let shell = Shell::start(parts).or_fail("router")?;
         Ok(Self { skew, shell: Some(shell) })
     }
 

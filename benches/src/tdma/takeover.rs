@@ -5,7 +5,7 @@ use super::plan::Plan;
 use super::routers::Routers;
 use super::stage::NODES;
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::interrupted;
+use rohrpost_bench_local::harness::{interrupted, look_for};
 use rohrpost_mailbox::{SystemClock, TimeRecord, monotonic_ns};
 use rohrpost_routers::tdma::{SlotTable, Window, WindowKind};
 use std::collections::HashSet;
@@ -66,14 +66,8 @@ pub fn kill_master(
     let cycle = Duration::from_micros(plan.cycle_us);
     let first = capture.len();
     std::thread::sleep(cycle * CYCLES + cycle.mul_f64(part_of_cycle));
-    let (began, nobody) = (Instant::now(), || Failure::Failed("nobody synchronises".into()));
-    let dead = loop {
-        match master(&capture.since(first)) {
-            Some(dead) => break dead,
-            None if began.elapsed() > SYNCHRONISED_WITHIN => return Err(nobody()),
-            None => std::thread::sleep(cycle),
-        }
-    };
+    let dead = look_for(SYNCHRONISED_WITHIN, cycle, || Ok(master(&capture.since(first))))?;
+    let dead = dead.ok_or_else(|| Failure::Failed("nobody synchronises".into()))?;
     let others: Vec<u8> = (0..NODES).filter(|node| *node != dead).collect();
     let clocks = others.iter().map(|node| routers.clock(*node)).collect::<Result<Vec<_>, Failure>>()?;
     let time = routers.clock(dead)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;

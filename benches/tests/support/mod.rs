@@ -6,7 +6,7 @@ use rohrpost_testbed::report;
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// Prefix of a failed contender's note.
@@ -16,7 +16,7 @@ pub(crate) const FAILED: &str = "FAILED";
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A run of this subcommand.
-pub(crate) fn bench(subcommand: &str, arguments: &[&str]) -> Command {
+fn bench(subcommand: &str, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_rohrpost-bench"));
     command.arg(subcommand).args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
@@ -130,7 +130,7 @@ const COUNTS: [&str; 12] = [
 ];
 
 /// Keys are there; figures are possible times or rates; ratios are there where both have figures.
-pub(crate) fn check_row(row: &Map<String, Value>) {
+fn check_row(row: &Map<String, Value>) {
     let missing: Vec<&&str> = KEYS.iter().filter(|key| !row.contains_key(**key)).collect();
     assert!(missing.is_empty(), "{row:?} lacks {missing:?}");
     let number = |key: &str| row[key].as_f64();
@@ -156,9 +156,20 @@ pub(crate) fn check_row(row: &Map<String, Value>) {
 }
 
 /// Process ids of its children.
-pub(crate) fn children(parent: &Child) -> Vec<String> {
+fn children(parent: &Child) -> Vec<String> {
     let list = format!("/proc/{0}/task/{0}/children", parent.id());
     std::fs::read_to_string(list).unwrap_or_default().split_whitespace().map(String::from).collect()
+}
+
+/// Begins so many rounds of a case that they do not end, and waits until a turn has its processes.
+pub(crate) fn begin(subcommand: &str, case: &str, is_turn: impl Fn(&mut Child, usize) -> bool) -> (Child, Vec<String>) {
+    let mut child = bench(subcommand, &["--only", case, "--rounds", "1000"]).spawn().unwrap();
+    let mut pids = Vec::new();
+    wait_for("a turn", || {
+        pids = children(&child);
+        is_turn(&mut child, pids.len())
+    });
+    (child, pids)
 }
 
 /// Whether none of these is still a process of the bench.
@@ -171,13 +182,13 @@ pub(crate) fn are_gone(pids: &[String]) -> bool {
 
 /// Interrupts a run that has these processes: it ends, and leaves none of them, and nothing in shared memory.
 pub(crate) fn interrupt(mut child: Child, pids: &[String]) {
-    signal(&child, Signal::SIGINT);
-    assert!(!child.wait().unwrap().success());
+    assert!(!end(&mut child, Signal::SIGINT).success());
     assert_eq!(left_behind(&prefix(&child)), [""; 0]);
     wait_for("the processes to end", || are_gone(pids));
 }
 
-/// Sends it a signal.
-pub(crate) fn signal(child: &Child, signal: Signal) {
+/// Sends it a signal, and waits for its end.
+pub(crate) fn end(child: &mut Child, signal: Signal) -> ExitStatus {
     kill(Pid::from_raw(i32::try_from(child.id()).unwrap()), signal).unwrap();
+    child.wait().unwrap()
 }

@@ -1,6 +1,6 @@
 //! One turn at a time: two that spin at real-time priority on the same processors would wait for each other's ends.
 
-use super::{Failure, interrupted};
+use super::{Failure, OrFail, interrupted};
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener};
 use std::time::Duration;
@@ -21,7 +21,7 @@ pub struct Alone {
 /// # Errors
 /// When it was interrupted meanwhile, or there are no such names.
 pub fn alone() -> Result<Alone, Failure> {
-    let name = SocketAddr::from_abstract_name(NAME).map_err(|error| Failure::of(NAME, error))?;
+    let name = SocketAddr::from_abstract_name(NAME).or_fail(NAME)?;
     loop {
         match UnixListener::bind_addr(&name) {
             Ok(listener) => return Ok(Alone { _name: listener }),

@@ -1,7 +1,7 @@
 //! Whether processes sleep between messages, as a case says of them. Woken, they take some ten times as long as awake:
 //! a turn with some of both would say how many of each there were, and nothing else.
 
-use super::Failure;
+use super::{Failure, OrFail};
 use std::fs;
 
 /// One of so many messages may have found its receiver awake, and one more: the first or the last.
@@ -12,8 +12,8 @@ const ONE_IN: u64 = 100;
 /// # Errors
 /// When the process is gone.
 pub fn given_away(pid: i32) -> Result<u64, Failure> {
-    let status = fs::read_to_string(format!("/proc/{pid}/status"));
-    let status = status.map_err(|error| Failure::of("how often a process gave its processor away", error))?;
+    let status =
+        fs::read_to_string(format!("/proc/{pid}/status")).or_fail("how often a process gave its processor away")?;
     let counts = status.lines().filter_map(|line| line.split_once("voluntary_ctxt_switches:"));
     Ok(counts.filter_map(|(_, count)| count.trim().parse::<u64>().ok()).sum())
 }

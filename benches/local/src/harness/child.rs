@@ -1,6 +1,6 @@
 //! A forked process that does one thing, tells why it failed, and dies with its parent.
 
-use super::{Failure, Gate, Shared, Zeroable, interrupted};
+use super::{Failure, Gate, OrFail, Shared, Zeroable, interrupted};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork, getppid};
@@ -69,7 +69,7 @@ impl Child {
         let report = Shared::<ChildReport>::new()?;
         let parent = nix::unistd::getpid();
         // SAFETY: the parent has no other thread (see above), so the child may do what any process may.
-        match unsafe { fork() }.map_err(|error| Failure::of("fork", error))? {
+        match unsafe { fork() }.or_fail("fork")? {
             ForkResult::Parent { child } => Ok(Self { pid: child, report, ended: None }),
             ForkResult::Child => {
                 // The parent may have gone between the fork and the wish to go with it.
@@ -139,8 +139,7 @@ impl Child {
     /// When the kernel does not know it, which cannot be.
     pub fn has_ended(&mut self) -> Result<bool, Failure> {
         if self.ended.is_none() {
-            let status = waitpid(self.pid, Some(WaitPidFlag::WNOHANG));
-            let status = status.map_err(|error| Failure::of("waitpid", error))?;
+            let status = waitpid(self.pid, Some(WaitPidFlag::WNOHANG)).or_fail("waitpid")?;
             self.ended = Some(status).filter(|status| *status != WaitStatus::StillAlive);
         }
         Ok(self.ended.is_some())

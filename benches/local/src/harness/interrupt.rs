@@ -26,6 +26,26 @@ pub fn interrupted() -> bool {
     INTERRUPTED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
+/// Looks each so often, and gives what is found; none if nothing is in time.
+///
+/// # Errors
+/// What looking fails with, or when a signal asks for an end meanwhile.
+pub fn look_for<T>(
+    within: Duration,
+    each: Duration,
+    mut look: impl FnMut() -> Result<Option<T>, Failure>,
+) -> Result<Option<T>, Failure> {
+    let give_up = Instant::now() + within;
+    loop {
+        match look()? {
+            None if Instant::now() > give_up => return Ok(None),
+            None if interrupted() => return Err(Failure::Failed("interrupted".into())),
+            None => std::thread::sleep(each),
+            found => return Ok(found),
+        }
+    }
+}
+
 /// Sleeps for so long.
 ///
 /// # Errors

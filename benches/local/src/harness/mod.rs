@@ -16,11 +16,11 @@ pub use alone::{Alone, alone};
 pub use asleep::{given_away, require_asleep};
 pub use child::Child;
 pub use cycles::CycleCounter;
-pub use interrupt::{heed, interrupted, rest};
+pub use interrupt::{heed, interrupted, look_for, rest};
 pub use machine::Machine;
 pub use ping_pong::{
-    Cell, GRACE, Link, Meetings, Pause, SAMPLES_MIN, SECOND_ENDS, check_echo, fill, ping, pong, time_two_processes,
-    time_two_threads,
+    Cell, GRACE, Link, Meetings, Pause, SAMPLES_MIN, SECOND_ENDS, check_echo, copy_whole, fill, ping, pong,
+    time_two_processes, time_two_threads,
 };
 pub use place::{End, Placement, Scheduling, processors, refusals, settle};
 pub use samples::{Samples, sample_in_child};
@@ -42,5 +42,20 @@ impl Failure {
     /// Something that went wrong while doing `what`.
     pub fn of(what: &str, error: impl std::fmt::Display) -> Self {
         Self::Failed(format!("{what}: {error}"))
+    }
+}
+
+/// Results with errors of all kinds.
+pub trait OrFail<T> {
+    /// The error as one of doing `what`.
+    ///
+    /// # Errors
+    /// When it is one.
+    fn or_fail(self, what: &str) -> Result<T, Failure>;
+}
+
+impl<T, E: std::fmt::Display> OrFail<T> for Result<T, E> {
+    fn or_fail(self, what: &str) -> Result<T, Failure> {
+        self.map_err(|error| Failure::of(what, error))
     }
 }

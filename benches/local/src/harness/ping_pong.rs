@@ -132,6 +132,18 @@ pub fn fill(message: &mut [u8], number: u64) {
     body.fill(number as u8);
 }
 
+/// Copies what came, which must be as long as what is expected.
+///
+/// # Errors
+/// When it is not.
+pub fn copy_whole(came: &[u8], message: &mut [u8]) -> Result<(), Failure> {
+    if came.len() != message.len() {
+        return Err(Failure::Failed(format!("{} bytes came, not {}", came.len(), message.len())));
+    }
+    message.copy_from_slice(came);
+    Ok(())
+}
+
 /// The message must be the very one that was sent.
 ///
 /// # Errors
@@ -275,6 +287,7 @@ pub fn time_two_threads<L: Link + Send>(cell: &Cell, make: impl Fn() -> [L; 2]) 
 
 #[cfg(test)]
 mod tests {
+    use super::super::OrFail;
     use super::*;
     use std::sync::mpsc::{Receiver, Sender, channel};
 
@@ -311,13 +324,13 @@ mod tests {
                 Mishap::Stale => message = self.last.clone(),
             }
             self.last = message.clone();
-            self.out.send(message).map_err(|error| Failure::of("send", error))
+            self.out.send(message).or_fail("send")
         }
 
         fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
             // Longer than a busy computer halts a thread for; waited for in vain where a message is lost.
             let patience = Duration::from_secs(1);
-            let received = self.back.recv_timeout(patience).map_err(|error| Failure::of("receive", error))?;
+            let received = self.back.recv_timeout(patience).or_fail("receive")?;
             message.copy_from_slice(&received);
             Ok(())
         }

@@ -18,6 +18,27 @@ pub enum End {
     Pong,
 }
 
+impl End {
+    /// The end that this one talks to.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Ping => Self::Pong,
+            Self::Pong => Self::Ping,
+        }
+    }
+
+    /// Its place in what both share: the near end is the first.
+    pub fn index(self) -> usize {
+        usize::from(self == Self::Pong)
+    }
+
+    /// Its place among the two nodes of a network.
+    pub fn node(self) -> &'static str {
+        if self == Self::Ping { "near" } else { "far" }
+    }
+}
+
 /// Which processors the two ends have.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Placement {

@@ -1,6 +1,6 @@
 //! Files in shared memory. They are removed at the end of a turn, or by the next run when their maker is dead.
 
-use super::Failure;
+use super::{Failure, OrFail};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -26,7 +26,7 @@ impl Scratch {
         static MADE: AtomicU32 = AtomicU32::new(0);
         let number = MADE.fetch_add(1, Ordering::Relaxed);
         let scratch = Self { name: format!("{PREFIX}{}-{number}-", std::process::id()) };
-        fs::create_dir(scratch.directory()).map_err(|error| Failure::of(SHARED_MEMORY, error))?;
+        fs::create_dir(scratch.directory()).or_fail(SHARED_MEMORY)?;
         Ok(scratch)
     }
 

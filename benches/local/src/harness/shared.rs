@@ -1,6 +1,6 @@
 //! Memory that the parent and its forked processes share.
 
-use super::Failure;
+use super::{Failure, OrFail};
 use std::num::NonZeroUsize;
 use std::ops::Deref;
 use std::ptr::NonNull;
@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 /// Zeroes are a valid value; everything in it is an atomic or an `UnsafeCell`, so that other processes may write it; it
 /// has no pointer and need not be dropped.
 pub unsafe trait Zeroable: Sync {}
+
+// SAFETY: made of such.
+unsafe impl<T: Zeroable, const N: usize> Zeroable for [T; N] {}
 
 /// One `T` in anonymous memory, zeroed and resident before any timing. Freed with the last process that has it.
 pub struct Shared<T: Zeroable> {
@@ -30,7 +33,7 @@ impl<T: Zeroable> Shared<T> {
         let access = ProtFlags::PROT_READ | ProtFlags::PROT_WRITE;
         // SAFETY: a new mapping wherever the kernel likes; it replaces nothing.
         let at = unsafe { mmap_anonymous(None, bytes, access, MapFlags::MAP_SHARED | MapFlags::MAP_POPULATE) };
-        Ok(Self { at: at.map_err(|error| Failure::of("shared memory", error))?.cast() })
+        Ok(Self { at: at.or_fail("shared memory")?.cast() })
     }
 }
 

@@ -11,15 +11,15 @@ use crate::lan::skewed::{SKEW, Shown, error_us};
 use crate::lan::udp::Datagrams;
 use crate::lan::wire::address;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{End, Failure, sample_in_child};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{End, Failure, OrFail, look_for, sample_in_child};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::shell::clock::{ClockParts, ClockService, Skew};
 use rohrpost_routers::time::{Role, TimeSettings};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How often the clocks are read, and how many times in a turn.
 const EACH: Duration = Duration::from_millis(1);
@@ -35,44 +35,31 @@ const PORT: u16 = 20_140;
 const MTU: u16 = 1_500;
 
 /// What must be reached, and what may be hoped for: µs, as p50, p99, p99.9 (none given) and maximum.
-const MUST: (&str, Summary) = ("2, 5, 15 us", Summary { p50: 2.0, p99: Some(5.0), p999: None, max: Some(15.0) });
-const HOPED: (&str, Summary) = ("0.5, 1.5, 3 us", Summary { p50: 0.5, p99: Some(1.5), p999: None, max: Some(3.0) });
-const RTNET: &str = "RTnet's formula";
+pub(in crate::cases) const MUST: (&str, Summary) =
+    ("2, 5, 15 us", Summary { p50: 2.0, p99: Some(5.0), p999: None, max: Some(15.0) });
+pub(in crate::cases) const HOPED: (&str, Summary) =
+    ("0.5, 1.5, 3 us", Summary { p50: 0.5, p99: Some(1.5), p999: None, max: Some(3.0) });
+pub(in crate::cases) const RTNET: &str = "RTnet's formula";
 
 /// All of them.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(LanClockCase)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("clock", None, "us", lan_clock_case)]
 }
 
-struct LanClockCase;
-
-impl Case for LanClockCase {
-    fn name(&self) -> String {
-        "clock".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let wire = Wire::new(MTU);
-        let wire = || wire.as_ref().map_err(Clone::clone);
-        let fixed = |(name, bounds)| Contender { name, turn: Box::new(move || Ok(bounds)) };
-        let contenders = [
-            Contender::sampled("rohrpost", || errors_us(wire()?, settings)),
-            Contender::sampled(RTNET, || {
-                let _load = load(wire()?)?;
-                rtnet::errors_us(wire()?, settings.count(SYNCHRONISATIONS))
-            }),
-            fixed(MUST),
-            fixed(HOPED),
-        ];
-        let bounded = |bound| Some(Target::AtMost(bound));
-        let versus = [
-            Versus { name: RTNET, p50: bounded(0.2), p99: None },
-            Versus { name: MUST.0, p50: bounded(1.0), p99: bounded(1.0) },
-            Versus { name: HOPED.0, p50: None, p99: None },
-        ];
-        let subject = Subject { case: self.name(), bytes: None, unit: "us" };
-        Ok(compare(settings, &subject, &contenders, &versus))
-    }
+fn lan_clock_case(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let wire = Wire::new(MTU);
+    let wire = || wire.as_ref().map_err(Clone::clone);
+    let contenders = [
+        Contender::sampled("rohrpost", || errors_us(wire()?, settings)),
+        Contender::sampled(RTNET, || {
+            let _load = load(wire()?)?;
+            rtnet::errors_us(wire()?, settings.count(SYNCHRONISATIONS))
+        })
+        .beside(at_most(0.2), None),
+        Contender::fixed(MUST.0, MUST.1).beside(at_most(1.0), at_most(1.0)),
+        Contender::fixed(HOPED.0, HOPED.1).beside(None, None),
+    ];
+    Ok(compare(settings, subject, &contenders))
 }
 
 fn load(wire: &Wire) -> Result<Load, Failure> {
@@ -85,13 +72,9 @@ fn errors_us(wire: &Wire, settings: &Settings) -> Result<Vec<f64>, Failure> {
     sample_in_child(PATIENCE, |samples| {
         let master = Timed::start(wire, End::Ping)?;
         let slave = Timed::start(wire, End::Pong)?;
-        let give_up = Instant::now() + PATIENCE;
-        while !slave.is_settled() {
-            if Instant::now() > give_up {
-                return Err(Failure::Failed(format!("the slave has no time: {:?}", slave.service.state().snapshot())));
-            }
-            std::thread::sleep(EACH);
-        }
+        let seen = || slave.service.state().snapshot();
+        let settled = look_for(PATIENCE, EACH, || Ok(slave.is_settled().then_some(())))?;
+        settled.ok_or_else(|| Failure::Failed(format!("the slave has no time: {:?}", seen())))?;
         for _ in 0..settings.count(SAMPLES) {
             std::thread::sleep(EACH);
             samples.push(error_us(&master.shown(), &slave.shown())?);
@@ -123,7 +106,7 @@ impl Timed {
         };
         let nodes = [End::Ping, End::Pong].map(|end| (address(end), PORT).into()).into();
         let parts = ClockParts { skew: Some(skew), ..ClockParts::at(nodes, settings) };
-        let service = ClockService::start(parts).map_err(|error| Failure::of("clock service", error))?;
+        let service = ClockService::start(parts).or_fail("clock service")?;
         Ok(Self { service, skew })
     }
 

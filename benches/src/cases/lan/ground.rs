@@ -1,21 +1,14 @@
 //! What the turns of a case share: a network of its own, and two nodes with their routers.
 
 use crate::lan::Wire;
-use crate::lan::nodes::{Network, Nodes, UNPACED};
-use rohrpost_bench_local::harness::Failure;
+use crate::lan::nodes::{Network, Nodes};
+use crate::lan::udp::Datagrams;
+use rohrpost_bench_local::harness::{Cell, Failure, time_two_processes};
 use rohrpost_bench_local::settings::Settings;
-use rohrpost_mailbox::StreamShape;
 use std::cell::Cell as Counter;
 
 /// The largest possible datagram, so that nothing is fragmented.
 pub(super) const WHOLE: u16 = u16::MAX;
-/// Of a current Ethernet.
-pub(super) const ETHERNET: u16 = 1_500;
-
-/// An Ethernet with routers that do not pace. Each node has a replica of the other's stream.
-pub(super) fn replicating(records: StreamShape) -> Network {
-    Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false, records: Some(records) }
-}
 
 /// What all turns of a case share.
 pub(super) struct LanSegment {
@@ -48,5 +41,16 @@ impl LanSegment {
         let turn = self.turns.get();
         self.turns.set(turn.wrapping_add(1));
         Ok((self.nodes.as_ref().map_err(Clone::clone)?, turn))
+    }
+
+    /// One way from module to module, µs.
+    pub(super) fn time(&self, cell: &Cell) -> Result<Vec<f64>, Failure> {
+        let (nodes, turn) = self.turn()?;
+        time_two_processes(cell, |end, meetings| nodes.module(end, turn, cell.bytes, meetings))
+    }
+
+    /// One way from socket to socket, µs.
+    pub(super) fn time_udp(&self, cell: &Cell) -> Result<Vec<f64>, Failure> {
+        time_two_processes(cell, |end, _| Datagrams::open(self.wire()?, end))
     }
 }

@@ -10,16 +10,14 @@
 //! forge it. The floor of each: a bare hop by UDP under the same junk, to ports that nobody reads. It shows what the
 //! junk costs the computer that carries it.
 
-use super::ground::{ETHERNET, LanSegment};
+use super::ground::LanSegment;
 use crate::lan::Wire;
 use crate::lan::junk::Junk;
-use crate::lan::nodes::{Network, UNPACED};
-use crate::lan::udp::Datagrams;
+use crate::lan::nodes::{ETHERNET, UNPACED};
 use crate::lan::wire::address;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{Cell, End, Failure, Pause, time_two_processes};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::harness::{Cell, End, Failure, Pause};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::statistics::Summary;
 use std::cell::RefCell;
 use std::time::Duration;
@@ -41,29 +39,18 @@ enum JunkSource {
 }
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let case = |name, from| Box::new(LanJunk { name, from }) as Box<dyn Case>;
+pub(super) fn cases() -> Vec<Case> {
     vec![case("junk", JunkSource::Stranger), case("junk of a peer", JunkSource::Peer)]
 }
 
-struct LanJunk {
-    name: &'static str,
-    from: JunkSource,
-}
-
-impl Case for LanJunk {
-    fn name(&self) -> String {
-        self.name.into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false, records: None };
-        let ground = LanSegment::on(settings, &network, Wire::with_stranger(network.mtu));
+fn case(name: &'static str, from: JunkSource) -> Case {
+    Case::new(name, BYTES, "us", move |settings, subject| {
+        let ground = LanSegment::on(settings, &UNPACED, Wire::with_stranger(ETHERNET));
         let cell = Cell { pause: Pause::Asleep(PACE), ..Cell::hop(BYTES, settings.count(MESSAGES)) };
         let rates = RefCell::new(Vec::new());
         let under_junk = |ports, timed: &dyn Fn() -> Result<Vec<f64>, Failure>| {
             let wire = ground.wire()?;
-            let go = || match self.from {
+            let go = || match from {
                 JunkSource::Stranger => wire.enter_stranger(),
                 JunkSource::Peer => wire.enter(End::Ping),
             };
@@ -72,30 +59,21 @@ impl Case for LanJunk {
             rates.borrow_mut().push(junk.end()?);
             samples
         };
-        let ours = || {
-            let (nodes, turn) = ground.turn()?;
-            time_two_processes(&cell, |end, meetings| nodes.module(end, turn, BYTES, meetings))
-        };
-        let udp = || time_two_processes(&cell, |end, _| Datagrams::open(ground.wire()?, end));
+        let ours = || ground.time(&cell);
+        let udp = || ground.time_udp(&cell);
+        let target = at_most(1.2).filter(|_| from == JunkSource::Stranger);
         let contenders = [
             Contender::sampled("rohrpost", || under_junk(&PORTS, &ours)),
-            Contender::sampled("no junk", ours),
-            Contender::sampled("udp, junk on unread ports", || under_junk(&UNREAD, &udp)),
-            Contender::sampled("udp", udp),
+            Contender::sampled("no junk", ours).beside(None, target),
+            Contender::sampled("udp, junk on unread ports", || under_junk(&UNREAD, &udp)).beside(None, None),
+            Contender::sampled("udp", udp).beside(None, None),
         ];
-        let target = (self.from == JunkSource::Stranger).then_some(Target::AtMost(1.2));
-        let versus = [
-            Versus { name: "no junk", p50: None, p99: target },
-            Versus { name: "udp, junk on unread ports", p50: None, p99: None },
-            Versus { name: "udp", p50: None, p99: None },
-        ];
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
-        let mut rows = compare(settings, &subject, &contenders, &versus);
+        let mut rows = compare(settings, subject, &contenders);
         let median = rohrpost_bench_local::statistics::median(rates.borrow().iter().copied());
         rows.extend(median.map(|median| {
-            let subject = Subject { case: self.name(), bytes: None, unit: "datagrams/s" };
+            let subject = Subject { case: name.into(), bytes: None, unit: "datagrams/s" };
             Row::alone(subject, "junk to each port", Ok(Summary::single(median)))
         }));
         Ok(rows)
-    }
+    })
 }

@@ -1,7 +1,7 @@
 //! Two nodes on a network of their own: how long a package takes over two routers, how many go, what is urgent past a
 //! flood.
 
-mod clock;
+pub(super) mod clock;
 mod ground;
 mod hop;
 mod junk;
@@ -13,7 +13,7 @@ mod urgent;
 use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
-pub fn all() -> Vec<Box<dyn Case>> {
+pub fn all() -> Vec<Case> {
     let all = [
         hop::cases(),
         sealed::cases(),

@@ -19,7 +19,7 @@ use crate::lan::nodes::{self, Network, UNPACED};
 use crate::lan::udp::Datagrams;
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{End, Failure};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_least, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::{Summary, median};
 use rohrpost_mailbox::HEAD_BYTES;
@@ -42,11 +42,11 @@ const MTU_MIN: usize = 576;
 const CBWARE: [(usize, f64); 4] = [(2112, 1200.0), (5860, 475.0), (15_236, 195.0), (36_084, 84.0)];
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     let rate = |bytes| Rate { name: "rate", bytes, packs: false, bound: 0.9 };
     let packing = Rate { name: "packing", bytes: 64, packs: true, bound: 3.0 };
     let rates = [64, 2112, 5860, 15_236, 36_084, 62_000].map(rate);
-    rates.into_iter().chain([packing]).map(|case| Box::new(case) as Box<dyn Case>).collect()
+    rates.into_iter().chain([packing]).map(Rate::case).collect()
 }
 
 struct Rate {
@@ -58,16 +58,15 @@ struct Rate {
     bound: f64,
 }
 
-impl Case for Rate {
-    fn name(&self) -> String {
-        self.name.into()
+impl Rate {
+    fn case(self) -> Case {
+        Case::new(self.name, self.bytes, "packages/s", move |settings, subject| Ok(self.measure(settings, subject)))
     }
 
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+    fn measure(&self, settings: &Settings, subject: &Subject) -> Vec<Row> {
         let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
         let mtu = if self.packs { WHOLE } else { u16::try_from(one).unwrap_or(WHOLE) };
-        let ground =
-            LanSegment::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB", sealed: false, records: None });
+        let ground = LanSegment::new(settings, &Network { mtu, quota: "64 MiB", ..UNPACED });
         let losses = Losses::default();
         let raw = Flow {
             bytes: self.bytes,
@@ -92,31 +91,24 @@ impl Case for Rate {
         let mut contenders = vec![
             losses.rated("rohrpost", || ours(&apart)),
             losses.rated(BESIDE_ROUTER, || ours(&beside)),
-            losses.rated("udp", || {
-                let open = |end| Datagrams::open(ground.wire()?, end);
-                flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(LOOK))
-            }),
+            losses
+                .rated("udp", || {
+                    let open = |end| Datagrams::open(ground.wire()?, end);
+                    flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(LOOK))
+                })
+                .beside(at_least(self.bound), None),
         ];
         contenders.extend(cbware(self.bytes));
-        let versus: Vec<Versus> = contenders[2..]
-            .iter()
-            .map(|other| Versus {
-                name: other.name,
-                p50: (other.name == "udp").then_some(Target::AtLeast(self.bound)),
-                p99: None,
-            })
-            .collect();
-        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "packages/s" };
-        let mut rows = compare(settings, &subject, &contenders, &versus);
-        rows.extend(losses.rows(&subject));
-        Ok(rows)
+        let mut rows = compare(settings, subject, &contenders);
+        rows.extend(losses.rows(subject));
+        rows
     }
 }
 
 /// What CBWare reached with messages of this size, if its table says so.
 pub(super) fn cbware(bytes: usize) -> Option<Contender<'static>> {
     let (_, rate) = CBWARE.into_iter().find(|(its, _)| *its == bytes)?;
-    Some(Contender { name: "CBWare, its table", turn: Box::new(move || Ok(Summary::single(rate))) })
+    Some(Contender::fixed("CBWare, its table", Summary::single(rate)).beside(None, None))
 }
 
 fn messages(settings: &Settings) -> u64 {
@@ -143,12 +135,11 @@ impl Losses {
         messages: usize,
         turn: impl Fn() -> Result<Flown, Failure> + 'a,
     ) -> Contender<'a> {
-        let turn = move || {
+        Contender::single(name, move || {
             let flown = turn()?;
             self.0.borrow_mut().push((name, flown.lost_percent()));
-            Ok(Summary::single(flown.rate() / messages as f64))
-        };
-        Contender { name, turn: Box::new(turn) }
+            Ok(flown.rate() / messages as f64)
+        })
     }
 
     /// One for each contender that had a turn: the median over rounds, and the worst.
@@ -157,16 +148,8 @@ impl Losses {
         let of = |contender| losses.iter().filter(move |(name, _)| *name == contender).map(|(_, percent)| *percent);
         let row = |contender| {
             let summary = Summary { max: of(contender).reduce(f64::max), ..Summary::single(median(of(contender))?) };
-            Some(Row {
-                case: format!("{}, lost", subject.case),
-                bytes: subject.bytes,
-                contender,
-                unit: "%",
-                result: Ok(summary),
-                versus: None,
-                ratio_p50: None,
-                ratio_p99: None,
-            })
+            let subject = Subject { case: format!("{}, lost", subject.case), bytes: subject.bytes, unit: "%" };
+            Some(Row::alone(subject, contender, Ok(summary)))
         };
         ["rohrpost", BESIDE_ROUTER, "udp"].into_iter().filter_map(row).collect()
     }

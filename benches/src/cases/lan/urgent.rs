@@ -25,15 +25,16 @@
 use super::ground::LanSegment;
 use crate::lan::Wire;
 use crate::lan::ends::{LanSink, LanSource};
-use crate::lan::flow::{Inlet, LOOK, Outlet};
+use crate::lan::flow::{LOOK, Outlet};
 use crate::lan::nodes::{self, Network, Nodes};
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::udp::Datagrams;
+use crate::one_way::Sink;
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
     Cell, Child, End, Failure, Gate, Pause, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
 };
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
 use rohrpost_mailbox::{StreamShape, sys};
@@ -67,10 +68,10 @@ const FLOOD_PORT: u16 = 20_217;
 const WIRE_BYTES: u64 = 66;
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     let urgent = |name, network: Network, mib_s: u64, records| {
-        let network = Network { records, ..network };
-        Box::new(Urgent { name, network, bytes_s: mib_s << 20 }) as Box<dyn Case>
+        let case = Urgent { network: Network { records, ..network }, bytes_s: mib_s << 20 };
+        Case::new(name, BYTES, "us", move |settings, subject| Ok(case.measure(settings, subject)))
     };
     vec![
         urgent("urgent", CARRIED, 10, None),
@@ -81,29 +82,16 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
 }
 
 struct Urgent {
-    name: &'static str,
     network: Network,
     /// The network's rate.
     bytes_s: u64,
 }
 
-impl Case for Urgent {
-    fn name(&self) -> String {
-        self.name.into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+impl Urgent {
+    fn measure(&self, settings: &Settings, subject: &Subject) -> Vec<Row> {
         let ground = LanSegment::new(settings, &self.network);
-        let messages = settings.count(MESSAGES);
-        let cell = Cell {
-            bytes: BYTES,
-            messages,
-            warm_up: WARM_UP.min(messages / 10),
-            placement: Placement::TwoCores,
-            scheduling: Scheduling::Fifo,
-            pause: Pause::Asleep(PACE),
-            cap: CAP,
-        };
+        let hop = Cell::hop(BYTES, settings.count(MESSAGES));
+        let cell = Cell { warm_up: hop.warm_up.min(WARM_UP), pause: Pause::Asleep(PACE), cap: CAP, ..hop };
         let floods = [RefCell::new(Vec::new()), RefCell::new(Vec::new())];
         let beside = |flood: Flooder, floods: &RefCell<Vec<_>>, samples: Result<Vec<f64>, Failure>| {
             let flooded = flood.end();
@@ -111,7 +99,8 @@ impl Case for Urgent {
             floods.borrow_mut().push(flooded?);
             Ok(samples)
         };
-        let udp = || time_two_processes(&cell, |end, _| Datagrams::open(ground.wire()?, end));
+        let udp = || ground.time_udp(&cell);
+        let p99 = if self.network.records.is_some() { 2.0 } else { 3.0 };
         let contenders = [
             Contender::sampled("rohrpost", || {
                 let (nodes, turn) = ground.turn()?;
@@ -124,25 +113,21 @@ impl Case for Urgent {
             Contender::sampled("no flood", || {
                 let (nodes, turn) = ground.turn()?;
                 urgent(nodes, turn, &cell)
-            }),
-            Contender::sampled("udp", || beside(Flooder::bare(ground.wire()?, self.bytes_s)?, &floods[1], udp())),
+            })
+            .beside(at_most(1.5), at_most(p99)),
+            Contender::sampled("udp", || beside(Flooder::bare(ground.wire()?, self.bytes_s)?, &floods[1], udp()))
+                .beside(None, None),
             Contender::sampled("udp, no flood", udp),
         ];
-        let p99 = if self.network.records.is_some() { 2.0 } else { 3.0 };
-        let versus = [
-            Versus { name: "no flood", p50: Some(Target::AtMost(1.5)), p99: Some(Target::AtMost(p99)) },
-            Versus { name: "udp", p50: None, p99: None },
-        ];
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
-        let mut rows = compare(settings, &subject, &contenders, &versus);
+        let mut rows = compare(settings, subject, &contenders);
         let what = match self.network.records {
             None => ("packages/s", FLOOD_BYTES),
             Some(_) => ("records/s", RECORD_BYTES),
         };
-        rows.extend(flood_rows(&self.name(), what, ["flood, taken", "flood, arrived"], &floods[0].borrow()));
+        rows.extend(flood_rows(&subject.case, what, ["flood, taken", "flood, arrived"], &floods[0].borrow()));
         let (what, udp) = (("packages/s", FLOOD_BYTES), ["flood by udp, sent", "flood by udp, arrived"]);
-        rows.extend(flood_rows(&self.name(), what, udp, &floods[1].borrow()));
-        Ok(rows)
+        rows.extend(flood_rows(&subject.case, what, udp, &floods[1].borrow()));
+        rows
     }
 }
 
@@ -223,7 +208,7 @@ impl Flooder {
                 sent_bytes = may_bytes.saturating_sub((LULL.as_secs_f64() * bytes_s as f64) as u64).max(sent_bytes);
                 let may = sent_bytes <= may_bytes;
                 if may {
-                    Inlet::send(&mut socket, message)?;
+                    Sink::send(&mut socket, message)?;
                     sent_bytes += FLOOD_BYTES as u64 + WIRE_BYTES;
                 }
                 Ok(may)

@@ -8,6 +8,6 @@ mod turn;
 use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
-pub fn all() -> Vec<Box<dyn Case>> {
+pub fn all() -> Vec<Case> {
     [c::cases(), python::cases(), remote::cases()].into_iter().flatten().collect()
 }

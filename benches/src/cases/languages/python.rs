@@ -1,7 +1,7 @@
 //! Modules in Python on one node: data between two of them, beside the same in Rust and what else there is for Python;
 //! pictures that are read in place; and calls of a module in Rust.
 
-use super::turn::{BYTES, at_most, cell};
+use super::turn::{BYTES, cell};
 use crate::cases::errors::as_failure;
 use crate::foreign::{ForeignProgram, time_one_program, time_two_programs};
 use crate::languages::Interpreter;
@@ -9,8 +9,8 @@ use crate::motor::{reach_motor, start_motor};
 use crate::player::player;
 use crate::tcp::systems::free_address;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{Cell, Child, End, Failure, Scratch, sample_in_child, settle};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, compare};
+use rohrpost_bench_local::harness::{Cell, Child, End, Failure, OrFail, Scratch, sample_in_child, settle};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use std::fs;
 use std::path::PathBuf;
@@ -75,9 +75,18 @@ calls = ["motor.0"]
 "#;
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let [small, large] = SIZES.map(|size| -> Box<dyn Case> { Box::new(Picture { size }) });
-    vec![Box::new(Between), small, large, Box::new(Called)]
+pub(super) fn cases() -> Vec<Case> {
+    let [small, large] = SIZES.map(|size| {
+        Case::new("Python, picture", size.iter().product::<usize>(), "us", move |settings, subject| {
+            Ok(Picture { size }.measure(settings, subject))
+        })
+    });
+    vec![
+        Case::new("Python, data", BYTES, "us", between),
+        small,
+        large,
+        Case::new("Python, call", None, "us", call_from_python),
+    ]
 }
 
 /// A node of its own, by its files.
@@ -88,7 +97,7 @@ struct ScratchNode {
 impl ScratchNode {
     fn new() -> Result<Self, Failure> {
         let node = Self { scratch: Scratch::new()? };
-        fs::write(node.config(), CONFIGURATION).map_err(|error| Failure::of("configuration", error))?;
+        fs::write(node.config(), CONFIGURATION).or_fail("configuration")?;
         Ok(node)
     }
 
@@ -107,42 +116,34 @@ impl ScratchNode {
 }
 
 /// Data of 64 bytes from one module to another.
-struct Between;
-
-impl Case for Between {
-    fn name(&self) -> String {
-        "Python, data".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let (cell, python) = (cell(settings), Interpreter::of(settings));
-        let contenders = [
-            Contender::sampled("Python", || {
-                let place = ScratchNode::new()?;
-                let program = place.runs(&python, "player.py", &[])?;
-                one_way(time_two_programs(&cell, &place.scratch, |_| program.clone()))
-            }),
-            Contender::sampled("Rust", || {
-                let place = ScratchNode::new()?;
-                let program = player(&place.scratch.directory(), &place.config())?;
-                one_way(time_two_programs(&cell, &place.scratch, |_| program.clone()))
-            }),
-            Contender::sampled("iceoryx2", || {
-                python.require("iceoryx2")?;
-                let scratch = Scratch::new()?;
-                let program = python.runs("iceoryx.py", &names(&scratch).each_ref().map(String::as_str));
-                one_way(time_two_programs(&cell, &scratch, |_| program.clone()))
-            }),
-            Contender::sampled("zenoh", || {
-                python.require("zenoh")?;
-                let (address, scratch) = (free_address()?.to_string(), Scratch::new()?);
-                one_way(time_two_programs(&cell, &scratch, |_| python.runs("zenoh_peer.py", &[&address])))
-            }),
-        ];
-        let versus = [at_most("Rust", OF_RUST), at_most("iceoryx2", OF_PEERS), at_most("zenoh", OF_PEERS)];
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
-        Ok(compare(settings, &subject, &contenders, &versus))
-    }
+fn between(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let (cell, python) = (cell(settings), Interpreter::of(settings));
+    let contenders = [
+        Contender::sampled("Python", || {
+            let place = ScratchNode::new()?;
+            one_way(time_two_programs(&cell, &place.scratch, &place.runs(&python, "player.py", &[])?))
+        }),
+        Contender::sampled("Rust", || {
+            let place = ScratchNode::new()?;
+            let program = player(&place.scratch.directory(), &place.config())?;
+            one_way(time_two_programs(&cell, &place.scratch, &program))
+        })
+        .beside(at_most(OF_RUST), None),
+        Contender::sampled("iceoryx2", || {
+            python.require("iceoryx2")?;
+            let scratch = Scratch::new()?;
+            let program = python.runs("iceoryx.py", &names(&scratch).each_ref().map(String::as_str));
+            one_way(time_two_programs(&cell, &scratch, &program))
+        })
+        .beside(at_most(OF_PEERS), None),
+        Contender::sampled("zenoh", || {
+            python.require("zenoh")?;
+            let (address, scratch) = (free_address()?.to_string(), Scratch::new()?);
+            one_way(time_two_programs(&cell, &scratch, &python.runs("zenoh_peer.py", &[&address])))
+        })
+        .beside(at_most(OF_PEERS), None),
+    ];
+    Ok(compare(settings, subject, &contenders))
 }
 
 /// Where what iceoryx2 makes lies, and the prefix of its names in shared memory.
@@ -164,7 +165,7 @@ impl Picture {
     fn turn(&self, cell: &Cell, python: &Interpreter, (size, stream): ([usize; 2], &str)) -> Result<Vec<f64>, Failure> {
         let (place, [width, height]) = (ScratchNode::new()?, size.map(|pixels| pixels.to_string()));
         let program = place.runs(python, "picture.py", &[&width, &height, stream])?;
-        time_two_programs(cell, &place.scratch, |_| program.clone())
+        time_two_programs(cell, &place.scratch, &program)
     }
 
     fn iceoryx(&self, cell: &Cell, python: &Interpreter) -> Result<Vec<f64>, Failure> {
@@ -172,59 +173,41 @@ impl Picture {
         let (scratch, [width, height]) = (Scratch::new()?, self.size.map(|pixels| pixels.to_string()));
         let [folder, prefix] = names(&scratch);
         let program = python.runs("iceoryx_picture.py", &[&width, &height, &folder, &prefix]);
-        time_two_programs(cell, &scratch, |_| program.clone())
-    }
-}
-
-impl Case for Picture {
-    fn name(&self) -> String {
-        "Python, picture".into()
+        time_two_programs(cell, &scratch, &program)
     }
 
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+    fn measure(&self, settings: &Settings, subject: &Subject) -> Vec<Row> {
         let (cell, python) = (cell(settings), Interpreter::of(settings));
         if let Err(skipped) = python.require("numpy") {
-            let subject = Subject { case: self.name(), bytes: Some(self.size.iter().product()), unit: "us" };
-            return Ok(vec![Row::alone(subject, "Python", Err(skipped))]);
+            return vec![Row::alone(subject.clone(), "Python", Err(skipped))];
         }
         let mut contenders = vec![
             Contender::sampled("Python", || self.turn(&cell, &python, (self.size, "image"))),
-            Contender::sampled("iceoryx2", || self.iceoryx(&cell, &python)),
+            Contender::sampled("iceoryx2", || self.iceoryx(&cell, &python)).beside(at_most(OF_PEERS), None),
             Contender::sampled("Python, pixels alone", || self.turn(&cell, &python, (self.size, "bare"))),
         ];
-        let mut versus = vec![at_most("iceoryx2", OF_PEERS)];
         if self.size != SIZES[0] {
-            contenders.push(Contender::sampled("1920 x 1080", || self.turn(&cell, &python, (SIZES[0], "image"))));
-            versus.push(at_most("1920 x 1080", OF_SMALLER));
+            let smaller = Contender::sampled("1920 x 1080", || self.turn(&cell, &python, (SIZES[0], "image")));
+            contenders.push(smaller.beside(at_most(OF_SMALLER), None));
         }
-        let subject = Subject { case: self.name(), bytes: Some(self.size.iter().product()), unit: "us" };
-        Ok(compare(settings, &subject, &contenders, &versus))
+        compare(settings, subject, &contenders)
     }
 }
 
 /// A call of a module in Rust that does nothing else, on the other processor.
-struct Called;
-
-impl Case for Called {
-    fn name(&self) -> String {
-        "Python, call".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let (cell, python) = (cell(settings), Interpreter::of(settings));
-        let contenders = [
-            Contender::sampled("Python", || {
-                let (place, motor) = called(&cell)?;
-                let program = place.runs(&python, "caller.py", &[])?;
-                let samples = time_one_program(&cell, &place.scratch, &program);
-                drop(motor);
-                samples
-            }),
-            Contender::sampled("Rust", || call(&cell)),
-        ];
-        let subject = Subject { case: self.name(), bytes: None, unit: "us" };
-        Ok(compare(settings, &subject, &contenders, &[at_most("Rust", OF_RUST)]))
-    }
+fn call_from_python(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let (cell, python) = (cell(settings), Interpreter::of(settings));
+    let contenders = [
+        Contender::sampled("Python", || {
+            let (place, motor) = called(&cell)?;
+            let program = place.runs(&python, "caller.py", &[])?;
+            let samples = time_one_program(&cell, &place.scratch, &program);
+            drop(motor);
+            samples
+        }),
+        Contender::sampled("Rust", || call(&cell)).beside(at_most(OF_RUST), None),
+    ];
+    Ok(compare(settings, subject, &contenders))
 }
 
 /// The module that is called; it ends with what is given.
@@ -245,7 +228,7 @@ fn call(cell: &Cell) -> Result<Vec<f64>, Failure> {
         for number in 0..cell.warm_up + cell.messages {
             cell.pause.take();
             let sent = Instant::now();
-            motor.drive(0.5, 0.25).map_err(|error| Failure::of("drive", error))?;
+            motor.drive(0.5, 0.25).or_fail("drive")?;
             let took = sent.elapsed();
             let is_warm = number >= cell.warm_up || began.elapsed() > cell.cap / 4;
             if is_warm {

@@ -9,7 +9,7 @@
 //! ```
 //! All of them there and back again.
 
-use super::turn::{BYTES, at_most, cell};
+use super::turn::{BYTES, cell};
 use crate::cases::tcp::TcpSegment;
 use crate::foreign::{time_one_program, time_two_programs};
 use crate::languages::Interpreter;
@@ -17,7 +17,7 @@ use crate::motor::start_motor;
 use crate::tcp::systems::{Security, free_address, system_of};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Cell, Child, End, Failure, Scratch};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::{Summary, median};
 use std::cell::RefCell;
@@ -26,32 +26,23 @@ use std::cell::RefCell;
 const OF_PARTS: f64 = 1.5;
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(RemoteCall)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("Python, remote call", None, "us", remote_call)]
 }
 
-struct RemoteCall;
-
-impl Case for RemoteCall {
-    fn name(&self) -> String {
-        "Python, remote call".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let (cell, python) = (cell(settings), Interpreter::of(settings));
-        let (segment, parts) = (TcpSegment::start(settings, Security::None), Parts::default());
-        let motor = segment
-            .systems()
-            .and_then(|systems| start_motor(&systems.folder(), &systems.configuration(End::Pong), cell.placement));
-        let contenders = [
-            Contender::sampled("Python", || call(&cell, &python, &segment, &motor)),
-            Contender::single("sockets + hop", || parts.time(&cell, &python, &segment)),
-        ];
-        let subject = Subject { case: self.name(), bytes: None, unit: "us" };
-        let mut rows = compare(settings, &subject, &contenders, &[at_most(contenders[1].name, OF_PARTS)]);
-        rows.extend(parts.rows(&subject));
-        Ok(rows)
-    }
+fn remote_call(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let (cell, python) = (cell(settings), Interpreter::of(settings));
+    let (segment, parts) = (TcpSegment::start(settings, Security::None), Parts::default());
+    let motor = segment
+        .systems()
+        .and_then(|systems| start_motor(&systems.folder(), &systems.configuration(End::Pong), cell.placement));
+    let contenders = [
+        Contender::sampled("Python", || call(&cell, &python, &segment, &motor)),
+        Contender::single("sockets + hop", || parts.time(&cell, &python, &segment)).beside(at_most(OF_PARTS), None),
+    ];
+    let mut rows = compare(settings, subject, &contenders);
+    rows.extend(parts.rows(subject));
+    Ok(rows)
 }
 
 /// Microseconds of each call.
@@ -82,7 +73,7 @@ impl Parts {
         let middle = |samples: Vec<f64>| median(samples).ok_or_else(|| Failure::Failed("not one sample".into()));
         python.require("socket")?;
         let (address, scratch) = (free_address()?.to_string(), Scratch::new()?);
-        let socket = middle(time_two_programs(cell, &scratch, |_| python.runs("sockets.py", &[&address]))?)?;
+        let socket = middle(time_two_programs(cell, &scratch, &python.runs("sockets.py", &[&address]))?)?;
         let hop = 2.0 * middle(segment.time(cell)?)?;
         self.sockets.borrow_mut().push(socket);
         self.hops.borrow_mut().push(hop);

@@ -3,7 +3,7 @@
 use super::workload::{CHUNK_BYTES, NAME, Workload};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
-use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::harness::{Failure, OrFail};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
@@ -14,7 +14,7 @@ const ZSTD_LEVEL: u32 = 1;
 
 /// Writes all, and closes the file.
 pub(super) fn write(folder: &Path, workload: &Workload) -> Result<(), Failure> {
-    try_write(folder, workload).map_err(|error| Failure::of("mcap", error))
+    try_write(folder, workload).or_fail("mcap")
 }
 
 fn try_write(folder: &Path, workload: &Workload) -> Result<(), Box<dyn std::error::Error>> {

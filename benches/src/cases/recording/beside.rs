@@ -3,11 +3,11 @@
 use super::workload::{NAME, Workload};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
-    Cell, Child, End, Failure, Link, Meetings, Pause, Placement, Scheduling, Scratch, Shared, Zeroable, given_away,
-    interrupted, require_asleep, time_two_processes,
+    Cell, Child, End, Failure, Link, Meetings, OrFail, Pause, Scratch, Shared, Zeroable, given_away, interrupted,
+    require_asleep, time_two_processes,
 };
 use rohrpost_bench_local::ours::{How, Mailboxes};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use rohrpost_schema::Type;
@@ -18,12 +18,8 @@ use std::time::{Duration, Instant};
 
 /// Of the packages: a speed.
 const BYTES: usize = 64;
-/// Round trips of a turn, and those before them that do not count.
-const MESSAGES: usize = 10_000;
-const WARM_UP: usize = 1_000;
 /// Before each round trip: the other end goes to sleep meanwhile, so that all find it so.
 const PAUSE: Duration = Duration::from_micros(100);
-const CAP: Duration = Duration::from_secs(2);
 /// What is recorded meanwhile: 50 MB in a second, as scans of 62 kB.
 const RECORDED_BYTES: usize = 62_000;
 const RECORDED_PERIOD: Duration = Duration::from_micros(1240);
@@ -45,31 +41,17 @@ struct RecordingTurn {
 unsafe impl Zeroable for RecordingTurn {}
 
 /// A pair of modules beside a recorder.
-pub(super) struct PairBeside;
+pub(super) fn case() -> Case {
+    Case::new("pair beside 50 MB/s recorded", BYTES, "us", pair_beside)
+}
 
-impl Case for PairBeside {
-    fn name(&self) -> String {
-        "pair beside 50 MB/s recorded".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let cell = Cell {
-            bytes: BYTES,
-            messages: settings.count(MESSAGES),
-            warm_up: settings.count(WARM_UP),
-            placement: Placement::TwoCores,
-            scheduling: Scheduling::Fifo,
-            pause: Pause::Asleep(PAUSE),
-            cap: CAP,
-        };
-        let contenders = [
-            Contender::sampled("rohrpost", || while_recorded(|| pair(&cell))),
-            Contender::sampled("without recorder", || pair(&cell)),
-        ];
-        let versus = Versus { name: contenders[1].name, p50: None, p99: Some(Target::AtMost(1.1)) };
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
-        Ok(compare(settings, &subject, &contenders, &[versus]))
-    }
+fn pair_beside(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let cell = Cell { pause: Pause::Asleep(PAUSE), ..Cell::hop(BYTES, settings.count(Cell::HOP_MESSAGES)) };
+    let contenders = [
+        Contender::sampled("rohrpost", || while_recorded(|| pair(&cell))),
+        Contender::sampled("without recorder", || pair(&cell)).beside(None, at_most(1.1)),
+    ];
+    Ok(compare(settings, subject, &contenders))
 }
 
 /// How often each end received, and gave its processor away meanwhile.
@@ -94,7 +76,7 @@ struct CountedEnd<'a> {
 impl<'a> CountedEnd<'a> {
     fn open(node: &Path, end: End, turn: &'a PairTurn, meetings: &mut Meetings) -> Result<Self, Failure> {
         let link = Mailboxes::open(node, end, BYTES, How::Blocking, meetings)?;
-        Ok(Self { link, end: usize::from(end == End::Pong), turn, before: None })
+        Ok(Self { link, end: end.index(), turn, before: None })
     }
 }
 
@@ -157,11 +139,10 @@ fn record(folder: &Path, shared: &RecordingTurn) -> Result<(), Failure> {
     let workload = Workload { bytes: RECORDED_BYTES, messages: usize::MAX };
     workload.prepare();
     let options = Options { leave_bytes: 0, ..Options::new(folder, "bench") };
-    let start = |error| Failure::of("starting a recording", error);
-    let mut writer = Writer::start(options, Session::default()).map_err(start)?;
+    let mut writer = Writer::start(options, Session::default()).or_fail("starting a recording")?;
     let ty = Type::List(Box::new(Type::U8));
     let spec = ChannelSpec { name: NAME.0, item: NAME.1, ty: &ty, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).map_err(|error| Failure::of("a channel", error))?;
+    let channel = writer.channel(&spec).or_fail("a channel")?;
     let mut due = Instant::now();
     for (sequence, data) in workload.all() {
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
@@ -178,5 +159,5 @@ fn record(folder: &Path, shared: &RecordingTurn) -> Result<(), Failure> {
             break;
         }
     }
-    writer.finish().1.map_err(|error| Failure::of("closing the recording", error))
+    writer.finish().1.or_fail("closing the recording")
 }

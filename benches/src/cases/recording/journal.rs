@@ -6,9 +6,9 @@ use super::super::errors::{Done, as_failure};
 use crate::motor::{MOTOR, reach_motor, start_motor};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
-    End, Failure, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
+    End, Failure, OrFail, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
 };
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{Node, StreamId};
 use rohrpost_modules::journal::JOURNAL_NUMBER;
@@ -41,8 +41,26 @@ optional = true
 /// That it writes a journal. Nobody records.
 const RECORDING: &str = include_str!("../../../../tests/testbed/journal.toml");
 
+/// All cases of this file.
+pub(super) fn cases() -> [Case; 2] {
+    [
+        case("event with journal, on one processor", NotedEvent::OneProcessor),
+        case("event with journal, on two processors", NotedEvent::Woken),
+    ]
+}
+
+fn case(name: &str, event: NotedEvent) -> Case {
+    Case::new(name, None, "us", move |settings, subject| {
+        let contenders = [
+            Contender::sampled("rohrpost", || turn(settings, &event, true)),
+            Contender::sampled("without journal", || turn(settings, &event, false)).beside(at_most(1.15), None),
+        ];
+        Ok(compare(settings, subject, &contenders))
+    })
+}
+
 /// A command to a module and its answer.
-pub(super) enum NotedEvent {
+enum NotedEvent {
     /// Both on one processor: the one runs only while the other sleeps. No processor is woken, so it takes the least
     /// time, of which the journal's part is the largest.
     OneProcessor,
@@ -66,33 +84,12 @@ impl NotedEvent {
     }
 }
 
-impl Case for NotedEvent {
-    fn name(&self) -> String {
-        match self {
-            Self::OneProcessor => "event with journal, on one processor",
-            Self::Woken => "event with journal, on two processors",
-        }
-        .into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let contenders = [
-            Contender::sampled("rohrpost", || turn(settings, self, true)),
-            Contender::sampled("without journal", || turn(settings, self, false)),
-        ];
-        let versus = Versus { name: contenders[1].name, p50: Some(Target::AtMost(1.15)), p99: None };
-        let subject = Subject { case: self.name(), bytes: None, unit: "us" };
-        Ok(compare(settings, &subject, &contenders, &[versus]))
-    }
-}
-
 /// Microseconds of each command.
 fn turn(settings: &Settings, event: &NotedEvent, has_journal: bool) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
     let config = scratch.directory().join("bench.toml");
     let recording = if has_journal { RECORDING.replace("MODULE", "motor.0") } else { String::new() };
-    fs::write(&config, format!("{CONFIGURATION}{recording}"))
-        .map_err(|error| Failure::of("its configuration", error))?;
+    fs::write(&config, format!("{CONFIGURATION}{recording}")).or_fail("its configuration")?;
     let mut module = start_motor(&scratch.directory(), &config, event.placement())?;
     let counts = [WARM_UP, COMMANDS].map(|count| settings.count(count));
     let samples = sample_in_child(PATIENCE, |samples| {

@@ -8,14 +8,10 @@ mod recorder;
 mod replayed;
 mod workload;
 
-use beside::PairBeside;
-use journal::NotedEvent;
 use nix::sys::resource::{UsageWho, getrusage};
-use replayed::Replayed;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{Failure, Scratch, sample_in_child};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::harness::{Failure, OrFail, Scratch, sample_in_child};
+use rohrpost_bench_local::rounds::{Contender, Target, at_least, at_most, compare};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use workload::Workload;
@@ -31,16 +27,11 @@ const TURN_MESSAGES: usize = 500_000;
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// All cases, in the order in which they are measured.
-pub fn all() -> Vec<Box<dyn Case>> {
-    let cases = |figure| SIZES.map(|bytes| -> Box<dyn Case> { Box::new(Recorded { bytes, figure }) });
-    let others: [Box<dyn Case>; 5] = [
-        Box::new(PairBeside),
-        Box::new(NotedEvent::OneProcessor),
-        Box::new(NotedEvent::Woken),
-        Box::new(Replayed::Exact),
-        Box::new(Replayed::Spacing),
-    ];
-    cases(TurnFigure::Rate).into_iter().chain(cases(TurnFigure::ProcessorTime)).chain(others).collect()
+pub fn all() -> Vec<Case> {
+    let rate = SIZES.map(|bytes| case("recorded", bytes, "MB/s", TurnFigure::Rate, at_least(0.9)));
+    let time = SIZES.map(|bytes| case("recorded, processor", bytes, "us", TurnFigure::ProcessorTime, at_most(1.2)));
+    let replayed = [replayed::exact(), replayed::spacing()];
+    rate.into_iter().chain(time).chain([beside::case()]).chain(journal::cases()).chain(replayed).collect()
 }
 
 /// What of a turn is told.
@@ -51,26 +42,14 @@ enum TurnFigure {
 }
 
 /// As many messages as a turn has, one after the other, all in the file.
-struct Recorded {
-    bytes: usize,
-    figure: TurnFigure,
-}
-
-impl Case for Recorded {
-    fn name(&self) -> String {
-        match self.figure {
-            TurnFigure::Rate => "recorded".into(),
-            TurnFigure::ProcessorTime => "recorded, processor".into(),
-        }
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+fn case(name: &str, bytes: usize, unit: &'static str, figure: TurnFigure, target: Option<Target>) -> Case {
+    Case::new(name, bytes, unit, move |settings, subject| {
         let turn_bytes = if settings.quick { QUICK_BYTES } else { TURN_BYTES };
-        let messages = settings.count(TURN_MESSAGES.min(turn_bytes / self.bytes));
+        let messages = settings.count(TURN_MESSAGES.min(turn_bytes / bytes));
         let turn = |write: fn(&Path, &Workload) -> Result<(), Failure>| {
             move || {
                 let folder = Scratch::new()?;
-                let workload = Workload { bytes: self.bytes, messages };
+                let workload = Workload { bytes, messages };
                 let samples = sample_in_child(PATIENCE, |samples| {
                     workload.prepare();
                     let (began, began_cpu) = (Instant::now(), processor_time()?);
@@ -83,27 +62,21 @@ impl Case for Recorded {
                 let [seconds, processor_s] = samples[..] else {
                     return Err(Failure::Failed(format!("{} figures of a turn, not 2", samples.len())));
                 };
-                Ok(match self.figure {
-                    TurnFigure::Rate => (self.bytes * messages) as f64 / 1e6 / seconds,
+                Ok(match figure {
+                    TurnFigure::Rate => (bytes * messages) as f64 / 1e6 / seconds,
                     TurnFigure::ProcessorTime => processor_s * 1e6 / messages as f64,
                 })
             }
         };
-        let contenders =
-            [Contender::single("rohrpost", turn(recorder::write)), Contender::single("mcap", turn(bare::write))];
-        let (unit, target) = match self.figure {
-            TurnFigure::Rate => ("MB/s", Target::AtLeast(0.9)),
-            TurnFigure::ProcessorTime => ("us", Target::AtMost(1.2)),
-        };
-        let versus = Versus { name: contenders[1].name, p50: Some(target), p99: None };
-        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit };
-        Ok(compare(settings, &subject, &contenders, &[versus]))
-    }
+        let ours = Contender::single("rohrpost", turn(recorder::write));
+        let bare = Contender::single("mcap", turn(bare::write)).beside(target, None);
+        Ok(compare(settings, subject, &[ours, bare]))
+    })
 }
 
 /// What all threads of this process have taken of processors.
 fn processor_time() -> Result<Duration, Failure> {
-    let usage = getrusage(UsageWho::RUSAGE_SELF).map_err(|error| Failure::of("getrusage", error))?;
+    let usage = getrusage(UsageWho::RUSAGE_SELF).or_fail("getrusage")?;
     let microseconds = [usage.user_time(), usage.system_time()]
         .map(|time| Duration::from_secs(time.tv_sec() as u64) + Duration::from_micros(time.tv_usec() as u64));
     Ok(microseconds.into_iter().sum())

@@ -1,7 +1,7 @@
 //! Our recorder: a queue, and a thread that writes.
 
 use super::workload::{NAME, Workload};
-use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::harness::{Failure, OrFail};
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
@@ -16,12 +16,11 @@ const NAP: Duration = Duration::from_micros(200);
 
 /// Writes all, and closes the file.
 pub(super) fn write(folder: &Path, workload: &Workload) -> Result<(), Failure> {
-    let start = |error| Failure::of("starting a recording", error);
     let options = Options { leave_bytes: 0, ..Options::new(folder, "bench") };
-    let mut writer = Writer::start(options, Session::default()).map_err(start)?;
+    let mut writer = Writer::start(options, Session::default()).or_fail("starting a recording")?;
     let ty = Type::List(Box::new(Type::U8));
     let spec = ChannelSpec { name: NAME.0, item: NAME.1, ty: &ty, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).map_err(|error| Failure::of("a channel", error))?;
+    let channel = writer.channel(&spec).or_fail("a channel")?;
     let mut unseen = 0;
     for (sequence, data) in workload.all() {
         unseen += data.len();
@@ -33,7 +32,7 @@ pub(super) fn write(folder: &Path, workload: &Workload) -> Result<(), Failure> {
         }
         let now_ns = u64::from(sequence) * 1000;
         let message = Message { arrival_ns: now_ns, stamp_ns: now_ns, epoch: 1, sequence, data };
-        writer.write(channel, &message).map_err(|error| Failure::of("writing", error))?;
+        writer.write(channel, &message).or_fail("writing")?;
     }
-    writer.finish().1.map_err(|error| Failure::of("closing the recording", error))
+    writer.finish().1.or_fail("closing the recording")
 }

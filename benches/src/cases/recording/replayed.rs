@@ -1,8 +1,8 @@
 //! How fast the programs of a recorded demo are run again, and how exactly a replay keeps the distances between values.
 
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{Child, Failure, Scratch};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{Child, Failure, OrFail, Scratch};
+use rohrpost_bench_local::rounds::{Contender, at_least, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
 use std::cell::OnceCell;
@@ -23,55 +23,46 @@ const FILE: &str = "demo.mcap";
 /// The largest error of 99 in 100 distances, microseconds.
 const SPACING_US: f64 = 1000.0;
 
-/// What is done with the recording of a demo.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Replayed {
-    /// The programs of all its modules are run again, one after the other, and compared.
-    Exact,
-    /// It is played at its speed.
-    Spacing,
+/// The programs of all its modules are run again, one after the other, and compared.
+pub(super) fn exact() -> Case {
+    Case::new("exact replay of the demo", None, "s/s", |settings, subject| {
+        let demo = DemoOnce::new(settings);
+        let ours = Contender::single("rohrpost", || demo.get()?.speed());
+        let real_time = Contender::fixed("real time", Summary::single(1.0)).beside(at_least(20.0), None);
+        Ok(compare(settings, subject, &[ours, real_time]))
+    })
 }
 
-impl Case for Replayed {
-    fn name(&self) -> String {
-        match self {
-            Self::Exact => "exact replay of the demo",
-            Self::Spacing => "replay, error of spacing",
-        }
-        .into()
+/// It is played at its speed.
+pub(super) fn spacing() -> Case {
+    Case::new("replay, error of spacing", None, "us", |settings, subject| {
+        let demo = DemoOnce::new(settings);
+        let demo = &demo;
+        let error_of = |line| move || demo.get()?.spacing(settings, line);
+        let bound = Summary { p99: Some(SPACING_US), ..Summary::single(SPACING_US) };
+        let contenders = [
+            Contender::new("rohrpost", error_of("error of spacing at rate 1: ")),
+            Contender::fixed("1 ms", bound).beside(None, at_most(1.0)),
+            // What of its errors is left without the time for which others had the player's processor.
+            Contender::new("without waits", error_of("without waits for a processor: ")),
+        ];
+        Ok(compare(settings, subject, &contenders))
+    })
+}
+
+/// Made for the first round that needs it, the same for all.
+struct DemoOnce<'a> {
+    settings: &'a Settings,
+    made: OnceCell<Result<DemoRecording, Failure>>,
+}
+
+impl<'a> DemoOnce<'a> {
+    fn new(settings: &'a Settings) -> Self {
+        Self { settings, made: OnceCell::new() }
     }
 
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        // The same for all rounds.
-        let recording = OnceCell::new();
-        let recorded = || recording.get_or_init(|| DemoRecording::make(settings)).as_ref().map_err(Failure::clone);
-        let ours = Contender {
-            name: "rohrpost",
-            turn: Box::new(|| match self {
-                Self::Exact => recorded()?.speed().map(Summary::single),
-                Self::Spacing => recorded()?.spacing(settings, "error of spacing at rate 1: "),
-            }),
-        };
-        // What of its errors is left without the time for which others had the player's processor.
-        let own = Contender {
-            name: "without waits",
-            turn: Box::new(|| recorded()?.spacing(settings, "without waits for a processor: ")),
-        };
-        let (unit, versus, figure) = match self {
-            Self::Exact => {
-                let target = Some(Target::AtLeast(20.0));
-                ("s/s", Versus { name: "real time", p50: target, p99: None }, Summary::single(1.0))
-            }
-            Self::Spacing => {
-                let figure = Summary { p99: Some(SPACING_US), ..Summary::single(SPACING_US) };
-                ("us", Versus { name: "1 ms", p50: None, p99: Some(Target::AtMost(1.0)) }, figure)
-            }
-        };
-        let beside = Contender { name: versus.name, turn: Box::new(move || Ok(figure)) };
-        let subject = Subject { case: self.name(), bytes: None, unit };
-        let mut contenders = vec![ours, beside];
-        contenders.extend(Some(own).filter(|_| *self == Self::Spacing));
-        Ok(compare(settings, &subject, &contenders, &[versus]))
+    fn get(&self) -> Result<&DemoRecording, Failure> {
+        self.made.get_or_init(|| DemoRecording::make(self.settings)).as_ref().map_err(Failure::clone)
     }
 }
 
@@ -84,7 +75,7 @@ struct DemoRecording {
 impl DemoRecording {
     fn make(settings: &Settings) -> Result<Self, Failure> {
         let made = Self { rohrpost: settings.command()?, scratch: Scratch::new()? };
-        fs::create_dir(made.nodes()).map_err(|error| Failure::of("a folder for nodes", error))?;
+        fs::create_dir(made.nodes()).or_fail("a folder for nodes")?;
         let seconds = if settings.quick { QUICK_DEMO_S } else { DEMO_S }.to_string();
         made.run(&["demo", "--no-gui", "--quiet", "--seconds", &seconds, "--record", FILE])?;
         Ok(made)
@@ -101,13 +92,13 @@ impl DemoRecording {
         let command = arguments.join(" ");
         let failed = |error| Failure::of(&command, error);
         let child = Child::start(|| {
-            let (out, error) = (File::create(&said).map_err(failed)?, File::create(&complained).map_err(failed)?);
+            let (out, error) = (File::create(&said).or_fail(&command)?, File::create(&complained).or_fail(&command)?);
             let mut command = Command::new(&self.rohrpost);
             command.args(arguments).current_dir(&folder).env("ROHRPOST_DIR", self.nodes());
             Err(failed(command.stdin(Stdio::null()).stdout(out).stderr(error).exec()))
         })?;
         let ended = child.finish_program(Instant::now() + PATIENCE);
-        let text = fs::read_to_string(&said).map_err(failed)?;
+        let text = fs::read_to_string(&said).or_fail(&command)?;
         ended.map(|()| text).map_err(|failure| {
             let complaint = fs::read_to_string(&complained).unwrap_or_default();
             Failure::Failed(format!("rohrpost {command}: {failure}: {}", complaint.trim_end()))
@@ -119,11 +110,8 @@ impl DemoRecording {
         let began = Instant::now();
         let said = self.run(&["replay", "--exact", "--run-recorded", FILE, "--json"])?;
         let took = began.elapsed();
-        let runs: Vec<serde_json::Value> = said
-            .lines()
-            .map(serde_json::from_str)
-            .collect::<Result<_, _>>()
-            .map_err(|error| Failure::of("what exact replay says", error))?;
+        let runs: Vec<serde_json::Value> =
+            said.lines().map(serde_json::from_str).collect::<Result<_, _>>().or_fail("what exact replay says")?;
         if runs.is_empty() || runs.iter().any(|run| run["result"] != "identical") {
             return Err(Failure::Failed(format!("not identical: {said}")));
         }

@@ -1,6 +1,6 @@
 //! What is recorded: the same bytes for all, which compress as what sensors say does: to about a third.
 
-use rohrpost_bench_local::harness::Failure;
+use rohrpost_bench_local::harness::{Failure, OrFail};
 use std::fs;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -37,24 +37,23 @@ impl Workload {
     /// Whether there is one file, which has as many messages as were written, by its own statistics and by reading it
     /// through; the bytes of each are those of [`Self::all`].
     pub(super) fn check(&self, folder: &Path) -> Result<(), Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::of("reading what was recorded", error);
-        let files = fs::read_dir(folder).map_err(|error| failed(&error))?;
+        let files = fs::read_dir(folder).or_fail("reading what was recorded")?;
         let files: Vec<_> =
-            files.map(|file| Ok(file?.path())).collect::<std::io::Result<_>>().map_err(|e| failed(&e))?;
+            files.map(|file| Ok(file?.path())).collect::<std::io::Result<_>>().or_fail("reading what was recorded")?;
         let [file] = files.as_slice() else {
             return Err(Failure::Failed(format!("{} files, not one", files.len())));
         };
-        let bytes = fs::read(file).map_err(|error| failed(&error))?;
-        let stream = mcap::MessageStream::new(&bytes).map_err(|error| failed(&error))?;
+        let bytes = fs::read(file).or_fail("reading what was recorded")?;
+        let stream = mcap::MessageStream::new(&bytes).or_fail("reading what was recorded")?;
         let mut found = 0;
         for (message, (number, data)) in stream.zip(self.all()) {
-            let message = message.map_err(|error| failed(&error))?;
+            let message = message.or_fail("reading what was recorded")?;
             if message.sequence != number || message.data != data {
                 return Err(Failure::Failed(format!("message {number} is recorded with other bytes, or elsewhere")));
             }
             found += 1;
         }
-        let told = mcap::Summary::read(&bytes).map_err(|error| failed(&error))?.and_then(|summary| summary.stats);
+        let told = mcap::Summary::read(&bytes).or_fail("reading what was recorded")?.and_then(|summary| summary.stats);
         let told = told.map(|statistics| statistics.message_count);
         if found != self.messages || told != Some(self.messages as u64) {
             return Err(Failure::Failed(format!("{} written, {found} found, {told:?} told", self.messages)));

@@ -6,9 +6,9 @@
 use crate::streams::{StreamNode, stream_failure};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
-    CycleCounter, End, Failure, Placement, Samples, Scheduling, sample_in_child, settle,
+    CycleCounter, End, Failure, OrFail, Placement, Samples, Scheduling, sample_in_child, settle,
 };
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{Around, Stamp, StreamShape};
 use std::hint::black_box;
@@ -24,35 +24,23 @@ const EPOCH: u64 = 1;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The case of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(AroundTime)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("around", None, "ns", around_time)]
 }
 
-struct AroundTime;
-
-impl Case for AroundTime {
-    fn name(&self) -> String {
-        "around".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let times = settings.count(TIMES);
-        let ours = |name, records| {
-            let shape = StreamShape { record_bytes: 8, keep: records as u32, readers: 1, late: Duration::ZERO };
-            Contender::sampled(name, move || {
-                let node = StreamNode::new(shape)?;
-                sample_in_child(PATIENCE, |samples| in_stream(&node, records, times, samples))
-            })
-        };
-        let floor = Contender::sampled("binary search", || {
-            sample_in_child(PATIENCE, |samples| in_vector(MANY, times, samples))
-        });
-        let contenders = [ours("rohrpost", MANY), floor, ours("1000 records", FEW)];
-        let at_most =
-            |at: usize, bound| Versus { name: contenders[at].name, p50: Some(Target::AtMost(bound)), p99: None };
-        let versus = [at_most(1, 3.0), at_most(2, 2.5)];
-        Ok(compare(settings, &Subject { case: self.name(), bytes: None, unit: "ns" }, &contenders, &versus))
-    }
+fn around_time(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let times = settings.count(TIMES);
+    let ours = |name, records| {
+        let shape = StreamShape { record_bytes: 8, keep: records as u32, readers: 1, late: Duration::ZERO };
+        Contender::sampled(name, move || {
+            let node = StreamNode::new(shape)?;
+            sample_in_child(PATIENCE, |samples| in_stream(&node, records, times, samples))
+        })
+    };
+    let floor =
+        Contender::sampled("binary search", || sample_in_child(PATIENCE, |samples| in_vector(MANY, times, samples)));
+    let few = ours("1000 records", FEW).beside(at_most(2.5), None);
+    Ok(compare(settings, subject, &[ours("rohrpost", MANY), floor.beside(at_most(3.0), None), few]))
 }
 
 /// Looks in a stream that keeps all its records.
@@ -60,9 +48,7 @@ fn in_stream(node: &StreamNode, records: usize, times: usize, samples: &Samples)
     let stamps = stamps(records);
     let (mut writer, mut reader) = (node.writer()?, node.reader()?);
     for ns in &stamps {
-        writer
-            .write(Stamp { epoch: EPOCH, ns: *ns }, &ns.to_le_bytes())
-            .map_err(|error| Failure::of("write", error))?;
+        writer.write(Stamp { epoch: EPOCH, ns: *ns }, &ns.to_le_bytes()).or_fail("write")?;
     }
     time_lookups(&stamps, times, samples, |ns| match reader.around(Stamp { epoch: EPOCH, ns }) {
         Ok(Around::Records { before, after }) => Ok((before.stamp.ns, after.stamp.ns)),

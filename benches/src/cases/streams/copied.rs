@@ -5,8 +5,10 @@
 
 use crate::streams::{StreamNode, came, stamp};
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{End, Failure, Placement, Samples, Scheduling, fill, sample_in_child, settle};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{
+    End, Failure, OrFail, Placement, Samples, Scheduling, fill, sample_in_child, settle,
+};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{StreamShape, monotonic_ns};
 use std::hint::black_box;
@@ -21,36 +23,26 @@ const WARM_UP: usize = 60;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The case of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(CopiedRecords)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("copied", BYTES, "us", copied_records)]
 }
 
-struct CopiedRecords;
-
-impl Case for CopiedRecords {
-    fn name(&self) -> String {
-        "copied".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let records = settings.count(RECORDS);
-        let ours = Contender::sampled("rohrpost", || {
-            let node = StreamNode::new(SHAPE)?;
-            sample_in_child(PATIENCE, |samples| through_stream(&node, records, samples))
-        });
-        let floor =
-            Contender::sampled("two memcpy", || sample_in_child(PATIENCE, |samples| through_room(records, samples)));
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
-        let versus = Versus { name: floor.name, p50: Some(Target::AtMost(1.3)), p99: None };
-        Ok(compare(settings, &subject, &[ours, floor], &[versus]))
-    }
+fn copied_records(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let records = settings.count(RECORDS);
+    let ours = Contender::sampled("rohrpost", || {
+        let node = StreamNode::new(SHAPE)?;
+        sample_in_child(PATIENCE, |samples| through_stream(&node, records, samples))
+    });
+    let floor =
+        Contender::sampled("two memcpy", || sample_in_child(PATIENCE, |samples| through_room(records, samples)));
+    Ok(compare(settings, subject, &[ours, floor.beside(at_most(1.3), None)]))
 }
 
 fn through_stream(node: &StreamNode, records: usize, samples: &Samples) -> Result<(), Failure> {
     let (mut writer, mut reader) = (node.writer()?, node.reader()?);
     time_copies(records, samples, |message, copy| {
         let written = writer.write(stamp(writer.written()), message);
-        written.map_err(|error| Failure::of("write", error))?;
+        written.or_fail("write")?;
         came(reader.try_next_into(copy)).map(drop)
     })
 }

@@ -12,10 +12,9 @@ use crate::floors::ring::CacheLine;
 use crate::streams::{StreamNode, came, stamp, stream_failure};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
-    Child, CycleCounter, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, fill, settle,
+    Child, CycleCounter, End, Failure, Gate, OrFail, Placement, Samples, Scheduling, Shared, Zeroable, fill, settle,
 };
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
-use rohrpost_bench_local::settings::Settings;
+use rohrpost_bench_local::rounds::{Contender, Target, at_most, compare};
 use rohrpost_mailbox::{RecordInfo, StreamReader, StreamShape, Waiting, monotonic_ns};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -38,20 +37,12 @@ const PATIENCE: Duration = Duration::from_secs(20);
 const LAST: u64 = u64::MAX;
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     vec![
-        Box::new(WriteCost { name: "cost-of-write", pause_ns: 1_000, writes: 64_000, bound: Some(1.3) }),
+        case("cost-of-write", 1_000, 64_000, at_most(1.3)),
         // All that readers have read has left the writer's caches by then.
-        Box::new(WriteCost { name: "cost-of-write, paced", pause_ns: 100_000, writes: 1_600, bound: None }),
+        case("cost-of-write, paced", 100_000, 1_600, None),
     ]
-}
-
-struct WriteCost {
-    name: &'static str,
-    /// Between two writes.
-    pause_ns: u64,
-    writes: usize,
-    bound: Option<f64>,
 }
 
 /// What is beside the writer.
@@ -72,26 +63,21 @@ impl Readers {
     }
 }
 
-impl Case for WriteCost {
-    fn name(&self) -> String {
-        self.name.into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+/// `pause_ns`: between two writes.
+fn case(name: &str, pause_ns: u64, writes: usize, bound: Option<Target>) -> Case {
+    Case::new(name, BYTES, "ns", move |settings, subject| {
         let beside = |name, readers| {
-            let writes = if let Readers::Sleeping(_) = readers { WRITES_ASLEEP } else { self.writes };
-            Contender::sampled(name, move || cost(readers, self.pause_ns, settings.count(writes)))
+            let writes = if let Readers::Sleeping(_) = readers { WRITES_ASLEEP } else { writes };
+            Contender::sampled(name, move || cost(readers, pause_ns, settings.count(writes)))
         };
         let contenders = [
             beside("rohrpost", Readers::Looking),
-            beside("no reader", Readers::None),
+            beside("no reader", Readers::None).beside(bound, None),
             beside("1 sleeps", Readers::Sleeping(1)),
             beside("8 sleep", Readers::Sleeping(READERS)),
         ];
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "ns" };
-        let versus = Versus { name: contenders[1].name, p50: self.bound.map(Target::AtMost), p99: None };
-        Ok(compare(settings, &subject, &contenders, &[versus]))
-    }
+        Ok(compare(settings, subject, &contenders))
+    })
 }
 
 #[repr(C)]
@@ -144,7 +130,7 @@ fn write_all(
         let began = CycleCounter::now();
         let written = writer.write(stamp, &record);
         let ended = CycleCounter::now();
-        written.map_err(|error| Failure::of("write", error))?;
+        written.or_fail("write")?;
         if number >= WARM_UP {
             group_ns += clock.ns(began, ended);
         }
@@ -160,7 +146,7 @@ fn write_all(
     }
     fill(&mut record, LAST);
     let written = writer.write(stamp(writer.written()), &record);
-    written.map(drop).map_err(|error| Failure::of("write", error))
+    written.map(drop).or_fail("write")
 }
 
 /// Waits until so many records were read.

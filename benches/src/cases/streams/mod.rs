@@ -10,7 +10,7 @@ mod rate;
 use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
-pub fn all() -> Vec<Box<dyn Case>> {
+pub fn all() -> Vec<Case> {
     let all = [latency::cases(), copied::cases(), cost::cases(), rate::cases(), around::cases(), open::cases()];
     all.into_iter().flatten().collect()
 }

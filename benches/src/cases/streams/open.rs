@@ -4,8 +4,10 @@
 
 use crate::streams::{StreamNode, stamp, stream_failure};
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{End, Failure, Placement, Samples, Scheduling, fill, sample_in_child, settle};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{
+    End, Failure, OrFail, Placement, Samples, Scheduling, fill, sample_in_child, settle,
+};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::{StreamShape, monotonic_ns};
 use std::time::Duration;
@@ -23,32 +25,22 @@ const TOUCHED: usize = 16;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The case of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(FirstRecord)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("open", LARGE_BYTES, "us", first_record)]
 }
 
-struct FirstRecord;
-
-impl Case for FirstRecord {
-    fn name(&self) -> String {
-        "open".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let openings = settings.count(OPENINGS);
-        let opened = |name, bytes| {
-            let (record_bytes, keep) = ((bytes / FRAMES) as u32, FRAMES as u32 - 2);
-            let shape = StreamShape { record_bytes, keep, readers: 1, late: Duration::ZERO };
-            Contender::sampled(name, move || {
-                let node = StreamNode::new(shape)?;
-                sample_in_child(PATIENCE, |samples| open_often(&node, openings, samples))
-            })
-        };
-        let contenders = [opened("rohrpost", LARGE_BYTES), opened("1 MiB", SMALL_BYTES)];
-        let subject = Subject { case: self.name(), bytes: Some(LARGE_BYTES), unit: "us" };
-        let versus = Versus { name: contenders[1].name, p50: Some(Target::AtMost(2.0)), p99: None };
-        Ok(compare(settings, &subject, &contenders, &[versus]))
-    }
+fn first_record(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let openings = settings.count(OPENINGS);
+    let opened = |name, bytes| {
+        let (record_bytes, keep) = ((bytes / FRAMES) as u32, FRAMES as u32 - 2);
+        let shape = StreamShape { record_bytes, keep, readers: 1, late: Duration::ZERO };
+        Contender::sampled(name, move || {
+            let node = StreamNode::new(shape)?;
+            sample_in_child(PATIENCE, |samples| open_often(&node, openings, samples))
+        })
+    };
+    let small = opened("1 MiB", SMALL_BYTES).beside(at_most(2.0), None);
+    Ok(compare(settings, subject, &[opened("rohrpost", LARGE_BYTES), small]))
 }
 
 fn open_often(node: &StreamNode, openings: usize, samples: &Samples) -> Result<(), Failure> {
@@ -59,9 +51,9 @@ fn open_often(node: &StreamNode, openings: usize, samples: &Samples) -> Result<(
     let mut head = [0; TOUCHED];
     for number in 0..RECORDS {
         fill(&mut head, number);
-        let mut record = writer.begin(stamp(number)).map_err(|error| Failure::of("begin", error))?;
+        let mut record = writer.begin(stamp(number)).or_fail("begin")?;
         record.body_mut()[..TOUCHED].copy_from_slice(&head);
-        record.finish(record_bytes).map_err(|error| Failure::of("finish", error))?;
+        record.finish(record_bytes).or_fail("finish")?;
     }
     let open = node.readers()?;
     for _ in 0..openings {

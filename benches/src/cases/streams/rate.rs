@@ -5,7 +5,7 @@ use crate::one_way::{Stream, rate};
 use crate::streams::{Progress, RecordSink, RecordSource, StreamNode};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Failure, Scheduling, Shared};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_least, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_mailbox::StreamShape;
 use std::time::Duration;
@@ -15,30 +15,20 @@ const BYTES: usize = 64;
 const TURN: Duration = Duration::from_millis(500);
 
 /// The case of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(RecordRate)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("rate", BYTES, "records/s", record_rate)]
 }
 
-struct RecordRate;
-
-impl Case for RecordRate {
-    fn name(&self) -> String {
-        "rate".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let messages = if settings.quick { settings.count(usize::MAX) as u64 } else { u64::MAX };
-        let stream = Stream { bytes: BYTES, messages, senders: 1, scheduling: Scheduling::Fifo, cap: TURN };
-        let ours = Contender::single("rohrpost", || through_stream(&stream));
-        let floor = Contender::single("ring", || {
-            let ring = Shared::<SharedRing>::new()?;
-            let sink = |_| Ok(BareRing::<RingSender>::sender(&ring));
-            rate(&stream, sink, || Ok(BareRing::<RingReceiver>::receiver(&ring)))
-        });
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "records/s" };
-        let versus = Versus { name: floor.name, p50: Some(Target::AtLeast(0.5)), p99: None };
-        Ok(compare(settings, &subject, &[ours, floor], &[versus]))
-    }
+fn record_rate(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let messages = if settings.quick { settings.count(usize::MAX) as u64 } else { u64::MAX };
+    let stream = Stream { bytes: BYTES, messages, senders: 1, scheduling: Scheduling::Fifo, cap: TURN };
+    let ours = Contender::single("rohrpost", || through_stream(&stream));
+    let floor = Contender::single("ring", || {
+        let ring = Shared::<SharedRing>::new()?;
+        let sink = |_| Ok(BareRing::<RingSender>::sender(&ring));
+        rate(&stream, sink, || Ok(BareRing::<RingReceiver>::receiver(&ring)))
+    });
+    Ok(compare(settings, subject, &[ours, floor.beside(at_least(0.5), None)]))
 }
 
 fn through_stream(stream: &Stream) -> Result<f64, Failure> {

@@ -6,7 +6,7 @@ use crate::tcp::hostile::Hostile;
 use crate::tcp::systems::{Security, Systems};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Failure, Machine};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::{Ratio, Summary, median};
 use std::cell::RefCell;
@@ -37,43 +37,22 @@ const RATE: (&str, f64) = ("of what is sent", 0.995);
 const BESIDE: f64 = 1.2;
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     let habits =
         Habits { guests: GUESTS, per_s: PER_S, bytes: BYTES, one_stalls: false, warm_up: WARM_UP, counted: COUNTED };
     let plain = ClientTurn { contender: OURS, habits, security: Security::None, is_hostile: false };
     let beside = ClientTurn { habits: Habits { per_s: PER_S_BESIDE, ..habits }, ..plain };
     let sealed = ClientTurn { security: Security::Tls, ..beside };
     let stalled = ClientTurn { habits: Habits { one_stalls: true, ..beside.habits }, ..beside };
-    let bound = Versus { name: BOUND.0, p50: None, p99: Some(Target::AtMost(1.0)) };
-    let other = |name, p99| Versus { name, p50: None, p99 };
-    let felt = Some(Target::AtMost(BESIDE));
-    [
-        Clients { name: "clients", turns: vec![plain], versus: vec![bound] },
-        Clients {
-            name: "clients, sealed",
-            turns: vec![sealed, ClientTurn { contender: "not sealed", ..beside }],
-            versus: vec![bound, other("not sealed", None)],
-        },
-        Clients {
-            name: "clients, one stalled",
-            turns: vec![stalled, ClientTurn { contender: "none stalled", ..beside }],
-            versus: vec![other("none stalled", felt)],
-        },
-        Clients {
-            name: "clients, hostile beside",
-            turns: vec![ClientTurn { is_hostile: true, ..beside }, ClientTurn { contender: "nobody beside", ..beside }],
-            versus: vec![other("nobody beside", felt)],
-        },
+    let hostile = ClientTurn { is_hostile: true, ..beside };
+    let without = |contender| Some(ClientTurn { contender, ..beside });
+    let felt = at_most(BESIDE);
+    vec![
+        case("clients", true, plain, None, None),
+        case("clients, sealed", true, sealed, without("not sealed"), None),
+        case("clients, one stalled", false, stalled, without("none stalled"), felt),
+        case("clients, hostile beside", false, hostile, without("nobody beside"), felt),
     ]
-    .map(|case| Box::new(case) as Box<dyn Case>)
-    .into()
-}
-
-struct Clients {
-    name: &'static str,
-    /// Ours first.
-    turns: Vec<ClientTurn>,
-    versus: Vec<Versus>,
 }
 
 #[derive(Clone, Copy)]
@@ -95,36 +74,38 @@ struct ClientFigures {
     hostile_s: Option<f64>,
 }
 
-impl Case for Clients {
-    fn name(&self) -> String {
-        self.name.into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+/// Ours, beside another and its target, and beside the bound if it has one.
+fn case(
+    name: &'static str,
+    is_bounded: bool,
+    ours: ClientTurn,
+    other: Option<ClientTurn>,
+    felt: Option<Target>,
+) -> Case {
+    Case::new(name, BYTES, "us", move |settings, subject| {
         let seen = RefCell::new(Vec::new());
-        let mut contenders: Vec<Contender<'_>> = Vec::new();
-        for turn in &self.turns {
-            contenders.push(Contender::sampled(turn.contender, || {
+        let contender = |turn: ClientTurn| {
+            let seen = &seen;
+            Contender::sampled(turn.contender, move || {
                 let (latencies, one) = turn.take(settings)?;
                 seen.borrow_mut().push(one);
                 Ok(latencies)
-            }));
-        }
+            })
+        };
         let (bound, us) = BOUND;
-        let limit = Summary { p50: us, p99: Some(us), p999: None, max: None };
-        contenders.push(Contender { name: bound, turn: Box::new(move || Ok(limit)) });
-        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
-        let mut rows = compare(settings, &subject, &contenders, &self.versus);
-        drop(contenders);
-        // Without a bound this contender has no row.
-        rows.retain(|row| row.contender != bound || self.versus.iter().any(|versus| versus.name == bound));
-        for turn in &self.turns {
+        let limit = Contender::fixed(bound, Summary { p99: Some(us), ..Summary::single(us) });
+        let limit = is_bounded.then(|| limit.beside(None, at_most(1.0)));
+        let mut contenders = vec![contender(ours)];
+        contenders.extend(limit);
+        contenders.extend(other.map(|other| contender(other).beside(None, felt)));
+        let mut rows = compare(settings, subject, &contenders);
+        for turn in [Some(ours), other].into_iter().flatten() {
             let seen = seen.borrow();
             let own: Vec<&ClientFigures> = seen.iter().filter(|one| one.contender == turn.contender).collect();
-            rows.extend(turn.rows(self.name, &own));
+            rows.extend(turn.rows(name, &own));
         }
         Ok(rows)
-    }
+    })
 }
 
 impl ClientTurn {

@@ -6,8 +6,8 @@ use crate::tcp::relays::{time_mailbox_relays, time_relays};
 use crate::tcp::systems::{Security, Systems, bench};
 use crate::tcp::zenoh::time_zenoh;
 use rohrpost_bench_local::Case;
-use rohrpost_bench_local::harness::{Cell, End, Failure, time_two_processes};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::harness::{Cell, Failure, time_two_processes};
+use rohrpost_bench_local::rounds::{Contender, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use std::cell::Cell as Counter;
 use std::time::Duration;
@@ -20,50 +20,36 @@ const OF_RELAYS: f64 = 1.3;
 const OF_OPEN: f64 = 1.3;
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let hop = |is_sealed| move |bytes| Box::new(TcpHop { bytes, is_sealed }) as Box<dyn Case>;
-    let plain = [64, 1024, 16_384, 62_000].map(hop(false));
-    plain.into_iter().chain([64, 1024].map(hop(true))).collect()
+pub(super) fn cases() -> Vec<Case> {
+    [64, 1024, 16_384, 62_000].map(hop).into_iter().chain([64, 1024].map(sealed_hop)).collect()
 }
 
-struct TcpHop {
-    bytes: usize,
-    /// With TLS beside without; else beside the floor and zenoh.
-    is_sealed: bool,
-}
-
-impl Case for TcpHop {
-    fn name(&self) -> String {
-        if self.is_sealed { "hop, sealed" } else { "hop" }.into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let cell = Cell::hop(self.bytes, settings.count(Cell::HOP_MESSAGES));
-        let start = |security| TcpSegment::start(settings, security);
-        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "us" };
-        let at_most = |name, bound: Option<f64>| Versus { name, p50: bound.map(Target::AtMost), p99: None };
-        let open = start(Security::None);
-        if self.is_sealed {
-            let sealed = start(Security::Tls);
-            let contenders = [
-                Contender::sampled("rohrpost", || sealed.time(&cell)),
-                Contender::sampled("not sealed", || open.time(&cell)),
-            ];
-            return Ok(compare(settings, &subject, &contenders, &[at_most("not sealed", Some(OF_OPEN))]));
-        }
+/// Beside the floor and zenoh.
+fn hop(bytes: usize) -> Case {
+    Case::new("hop", bytes, "us", move |settings, subject| {
+        let cell = Cell::hop(bytes, settings.count(Cell::HOP_MESSAGES));
+        let open = TcpSegment::start(settings, Security::None);
         let contenders = [
             Contender::sampled("rohrpost", || open.time(&cell)),
-            Contender::sampled("relays", || time_relays(&cell)),
-            Contender::sampled("relays of mailboxes", || time_mailbox_relays(&cell)),
-            Contender::sampled("zenoh", || time_zenoh(&cell)),
+            Contender::sampled("relays", || time_relays(&cell)).beside(at_most(OF_RELAYS), None),
+            Contender::sampled("relays of mailboxes", || time_mailbox_relays(&cell)).beside(at_most(OF_RELAYS), None),
+            Contender::sampled("zenoh", || time_zenoh(&cell)).beside(None, None),
         ];
-        let versus = [
-            at_most("relays", Some(OF_RELAYS)),
-            at_most("relays of mailboxes", Some(OF_RELAYS)),
-            at_most("zenoh", None),
+        Ok(compare(settings, subject, &contenders))
+    })
+}
+
+/// With TLS beside without.
+fn sealed_hop(bytes: usize) -> Case {
+    Case::new("hop, sealed", bytes, "us", move |settings, subject| {
+        let cell = Cell::hop(bytes, settings.count(Cell::HOP_MESSAGES));
+        let [sealed, open] = [Security::Tls, Security::None].map(|security| TcpSegment::start(settings, security));
+        let contenders = [
+            Contender::sampled("rohrpost", || sealed.time(&cell)),
+            Contender::sampled("not sealed", || open.time(&cell)).beside(at_most(OF_OPEN), None),
         ];
-        Ok(compare(settings, &subject, &contenders, &versus))
-    }
+        Ok(compare(settings, subject, &contenders))
+    })
 }
 
 /// Two systems at a TCP router, and a module on each: what all turns of a case share.
@@ -90,7 +76,7 @@ impl TcpSegment {
         let turn = self.turns.get();
         self.turns.set(turn.wrapping_add(1));
         time_two_processes(cell, |end, meetings| {
-            let other = if end == End::Ping { End::Pong } else { End::Ping };
+            let other = end.other();
             let names = [bench(end, turn), bench(other, turn)];
             Module::between(&systems.directory(end), names, cell.bytes, meetings)
                 .map(|module| module.with_patience(LOST))

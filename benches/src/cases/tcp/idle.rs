@@ -4,7 +4,7 @@ use crate::tcp::crowd::{Crowd, Habits};
 use crate::tcp::systems::{Security, Systems};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Failure, rest};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
 use std::fs;
@@ -17,50 +17,32 @@ const SETTLES: Duration = Duration::from_secs(3);
 const BOUND: (&str, f64) = ("64 KiB", 64.0);
 
 /// All cases of this file.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     [("idle client", Security::None), ("idle client, sealed", Security::Tls)]
-        .map(|(name, security)| Box::new(Idle { name, security }) as Box<dyn Case>)
+        .map(|(name, security)| {
+            Case::new(name, None, "KiB", move |settings, subject| {
+                let ours = Contender::single("rohrpost", || kib_a_client(settings, security));
+                let bound = Contender::fixed(BOUND.0, Summary::single(BOUND.1)).beside(at_most(1.0), None);
+                Ok(compare(settings, subject, &[ours, bound]))
+            })
+        })
         .into()
 }
 
-struct Idle {
-    name: &'static str,
-    security: Security,
-}
-
-impl Case for Idle {
-    fn name(&self) -> String {
-        self.name.into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ours = || self.kib_a_client(settings).map(Summary::single);
-        let contenders = [
-            Contender { name: "rohrpost", turn: Box::new(ours) },
-            Contender { name: BOUND.0, turn: Box::new(|| Ok(Summary::single(BOUND.1))) },
-        ];
-        let versus = [Versus { name: BOUND.0, p50: Some(Target::AtMost(1.0)), p99: None }];
-        let subject = Subject { case: self.name(), bytes: None, unit: "KiB" };
-        Ok(compare(settings, &subject, &contenders, &versus))
-    }
-}
-
-impl Idle {
-    fn kib_a_client(&self, settings: &Settings) -> Result<f64, Failure> {
-        let mut systems = Systems::start(settings, self.security)?;
-        let settles = if settings.quick { SETTLES / 10 } else { SETTLES };
-        rest(settles)?;
-        let before = resident_kib(systems.router_pid())?;
-        let guests = if settings.quick { GUESTS_QUICK } else { GUESTS };
-        let idle =
-            Habits { guests, per_s: 0, bytes: 0, one_stalls: false, warm_up: Duration::ZERO, counted: Duration::ZERO };
-        let mut crowd = Crowd::gather(&systems, idle)?;
-        rest(settles)?;
-        let after = resident_kib(systems.router_pid())?;
-        systems.check()?;
-        crowd.is_there()?;
-        Ok((after - before) / f64::from(guests))
-    }
+fn kib_a_client(settings: &Settings, security: Security) -> Result<f64, Failure> {
+    let mut systems = Systems::start(settings, security)?;
+    let settles = if settings.quick { SETTLES / 10 } else { SETTLES };
+    rest(settles)?;
+    let before = resident_kib(systems.router_pid())?;
+    let guests = if settings.quick { GUESTS_QUICK } else { GUESTS };
+    let idle =
+        Habits { guests, per_s: 0, bytes: 0, one_stalls: false, warm_up: Duration::ZERO, counted: Duration::ZERO };
+    let mut crowd = Crowd::gather(&systems, idle)?;
+    rest(settles)?;
+    let after = resident_kib(systems.router_pid())?;
+    systems.check()?;
+    crowd.is_there()?;
+    Ok((after - before) / f64::from(guests))
 }
 
 /// Resident memory of a process.

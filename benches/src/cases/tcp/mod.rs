@@ -9,6 +9,6 @@ pub(super) use hop::TcpSegment;
 use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
-pub fn all() -> Vec<Box<dyn Case>> {
+pub fn all() -> Vec<Case> {
     [hop::cases(), clients::cases(), idle::cases()].into_iter().flatten().collect()
 }

@@ -6,6 +6,7 @@
 
 use super::goals::{Goal, figure};
 use super::plans::LOADED;
+use crate::cases::lan::clock::{HOPED, MUST, RTNET};
 use crate::lan::load::Load;
 use crate::lan::skewed::error_us;
 use crate::lan::udp::Datagrams;
@@ -14,9 +15,8 @@ use crate::tdma::shells::Shells;
 use crate::tdma::stage::{NODES, Stage};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{End, Failure, Scratch, sample_in_child};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
-use rohrpost_bench_local::statistics::Summary;
 use std::cell::RefCell;
 use std::time::Duration;
 
@@ -37,76 +37,52 @@ const SILENCES: usize = 5;
 const MEASURES: Duration = Duration::from_secs(10);
 const MEASURES_QUICK: Duration = Duration::from_millis(500);
 
-const MUST: (&str, Summary) = ("2, 5, 15 us", Summary { p50: 2.0, p99: Some(5.0), p999: None, max: Some(15.0) });
-const HOPED: (&str, Summary) = ("0.5, 1.5, 3 us", Summary { p50: 0.5, p99: Some(1.5), p999: None, max: Some(3.0) });
-const RTNET: &str = "RTnet's formula";
 const MOST: [Goal; 2] = [Goal { name: "must 15 us", most: 15.0 }, Goal { name: "hoped 3 us", most: 3.0 }];
 const AFTER_A_SECOND: [Goal; 2] = [Goal { name: "must 5 us", most: 5.0 }, Goal { name: "hoped 2 us", most: 2.0 }];
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(SlotClockCase), Box::new(Holdover)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("clock", None, "us", slot_clock), Case::new("holdover", None, "us", holdover)]
 }
 
-struct SlotClockCase;
-
-impl Case for SlotClockCase {
-    fn name(&self) -> String {
-        "clock".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let (stage, wire) = (Stage::new(), Wire::new(MTU));
-        let most_us = RefCell::new(Vec::new());
-        let fixed = |(name, bounds)| Contender { name, turn: Box::new(move || Ok(bounds)) };
-        let contenders = [
-            Contender::sampled("rohrpost", || {
-                let samples = errors_us(stage.as_ref().map_err(Clone::clone)?, settings)?;
-                most_us.borrow_mut().extend(samples.iter().copied().reduce(f64::max));
-                Ok(samples)
-            }),
-            Contender::sampled(RTNET, || {
-                let wire = wire.as_ref().map_err(Clone::clone)?;
-                let _load = Load::start(|| Datagrams::open(wire, End::Ping), || Datagrams::open(wire, End::Pong))?;
-                rtnet::errors_us(wire, settings.count(SYNCHRONISATIONS))
-            }),
-            fixed(MUST),
-            fixed(HOPED),
-        ];
-        let versus =
-            |name, p50: f64, p99: f64| Versus { name, p50: Some(Target::AtMost(p50)), p99: Some(Target::AtMost(p99)) };
-        // Five times better; twenty times in the middle and thirty at the end.
-        let (better, much_better) = (versus(RTNET, 0.2, 0.2), versus(RTNET, 0.05, 0.033));
-        let all = [better, much_better, versus(MUST.0, 1.0, 1.0), versus(HOPED.0, 1.0, 1.0)];
-        let mut rows = compare(settings, &subject("clock"), &contenders, &all);
-        rows.extend(figure(&subject("clock, max"), "rohrpost", &most_us.borrow(), &MOST));
-        Ok(rows)
-    }
-}
-
-struct Holdover;
-
-impl Case for Holdover {
-    fn name(&self) -> String {
-        "holdover".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let stage = Stage::new();
-        let most_us = RefCell::new(Vec::new());
-        let contenders = [Contender::sampled("after 1 s", || {
-            let stage = stage.as_ref().map_err(Clone::clone)?;
-            let samples = off_after_silence_us(stage, settings)?;
+fn slot_clock(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let (stage, wire) = (Stage::new(), Wire::new(MTU));
+    let most_us = RefCell::new(Vec::new());
+    let contenders = [
+        Contender::sampled("rohrpost", || {
+            let samples = errors_us(stage.as_ref().map_err(Clone::clone)?, settings)?;
             most_us.borrow_mut().extend(samples.iter().copied().reduce(f64::max));
             Ok(samples)
-        })];
-        let mut rows = compare(settings, &subject("holdover"), &contenders, &[]);
-        rows.extend(figure(&subject("holdover, max"), "after 1 s", &most_us.borrow(), &AFTER_A_SECOND));
-        Ok(rows)
-    }
+        }),
+        Contender::sampled(RTNET, || {
+            let wire = wire.as_ref().map_err(Clone::clone)?;
+            let _load = Load::start(|| Datagrams::open(wire, End::Ping), || Datagrams::open(wire, End::Pong))?;
+            rtnet::errors_us(wire, settings.count(SYNCHRONISATIONS))
+        })
+        // Five times better; twenty times in the middle and thirty at the end.
+        .beside(at_most(0.2), at_most(0.2))
+        .beside(at_most(0.05), at_most(0.033)),
+        Contender::fixed(MUST.0, MUST.1).beside(at_most(1.0), at_most(1.0)),
+        Contender::fixed(HOPED.0, HOPED.1).beside(at_most(1.0), at_most(1.0)),
+    ];
+    let mut rows = compare(settings, subject, &contenders);
+    let most = Subject { case: "clock, max".into(), ..subject.clone() };
+    rows.extend(figure(&most, "rohrpost", &most_us.borrow(), &MOST));
+    Ok(rows)
 }
 
-fn subject(case: &str) -> Subject {
-    Subject { case: case.into(), bytes: None, unit: "us" }
+fn holdover(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let stage = Stage::new();
+    let most_us = RefCell::new(Vec::new());
+    let contenders = [Contender::sampled("after 1 s", || {
+        let stage = stage.as_ref().map_err(Clone::clone)?;
+        let samples = off_after_silence_us(stage, settings)?;
+        most_us.borrow_mut().extend(samples.iter().copied().reduce(f64::max));
+        Ok(samples)
+    })];
+    let mut rows = compare(settings, subject, &contenders);
+    let most = Subject { case: "holdover, max".into(), ..subject.clone() };
+    rows.extend(figure(&most, "after 1 s", &most_us.borrow(), &AFTER_A_SECOND));
+    Ok(rows)
 }
 
 fn measures(settings: &Settings) -> Duration {

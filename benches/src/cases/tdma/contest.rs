@@ -4,9 +4,10 @@ use super::goals::{Goal, figure};
 use super::observed::{Observed, RunConditions, watched};
 use crate::tdma::bare::BareThreads;
 use crate::tdma::plan::Plan;
+use crate::tdma::rights::Rights;
 use crate::tdma::stage::Stage;
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
 use std::cell::RefCell;
@@ -20,6 +21,25 @@ pub(super) struct WatchedContender {
     pub plan: Plan,
     /// How its routers run.
     pub way: RunConditions,
+    /// Targets of the first one beside it.
+    pub versus: &'static [[Option<Target>; 2]],
+}
+
+impl WatchedContender {
+    /// With real-time scheduling, and without junk.
+    pub(super) fn new(contender: &'static str, plan: Plan, loaded: bool) -> Self {
+        let way = RunConditions { rights: Rights::RealTime, loaded, junk: false };
+        Self { contender, plan, way, versus: &[] }
+    }
+
+    /// The first one stands beside this, once for each pair of targets.
+    pub(super) fn beside(self, versus: &'static [[Option<Target>; 2]]) -> Self {
+        Self { versus, ..self }
+    }
+}
+
+fn with_targets<'a>(contender: Contender<'a>, versus: &[[Option<Target>; 2]]) -> Contender<'a> {
+    versus.iter().fold(contender, |contender, [p50, p99]| contender.beside(*p50, *p99))
 }
 
 /// Another figure of a turn, besides how far off slots began.
@@ -80,10 +100,8 @@ pub(super) struct Contest {
     pub watched: Vec<WatchedContender>,
     /// Goals apply to the first so many.
     pub with_goals: usize,
-    /// The goals of slots: a name and figures.
-    pub bounds: Vec<(&'static str, Summary)>,
-    /// Compared with the first one.
-    pub versus: Vec<Versus>,
+    /// The goals of slots: a name and figures, and the targets of the first one beside these.
+    pub bounds: Vec<(&'static str, Summary, [Option<Target>; 2])>,
     /// Other figures.
     pub figures: Vec<Figure>,
 }
@@ -101,13 +119,11 @@ impl Contest {
             Ok(summary)
         };
         let turn = &turn;
-        let contender = |(at, watched): (usize, &WatchedContender)| Contender {
-            name: watched.contender,
-            turn: Box::new(move || turn(at)),
+        let contender = |(at, watched): (usize, &WatchedContender)| {
+            with_targets(Contender::new(watched.contender, move || turn(at)), watched.versus)
         };
-        let fixed = |(name, bounds): &(&'static str, Summary)| {
-            let bounds = *bounds;
-            Contender { name, turn: Box::new(move || Ok(bounds)) }
+        let fixed = |&(name, bounds, [p50, p99]): &(&'static str, Summary, [Option<Target>; 2])| {
+            Contender::fixed(name, bounds).beside(p50, p99)
         };
         let bare = RefCell::new(Vec::new());
         let floor = Contender::sampled(BARE, || {
@@ -117,9 +133,10 @@ impl Contest {
             bare.borrow_mut().push(seen);
             Ok(late_us)
         });
-        let contenders = self.watched.iter().enumerate().map(contender).chain([floor]);
-        let contenders: Vec<Contender> = contenders.chain(self.bounds.iter().map(fixed)).collect();
-        let mut rows = compare(settings, &self.subject("us", None), &contenders, &self.versus);
+        let mut watched = self.watched.iter().enumerate().map(contender);
+        let contenders = watched.next().into_iter().chain(self.bounds.iter().map(fixed)).chain(watched).chain([floor]);
+        let contenders: Vec<Contender> = contenders.collect();
+        let mut rows = compare(settings, &self.subject("us", None), &contenders);
         drop(contenders);
         let seen: Vec<ObservedRounds> = all.into_iter().map(RefCell::into_inner).collect();
         for figure in &self.figures {

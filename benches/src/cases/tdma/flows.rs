@@ -2,8 +2,8 @@
 //! `rohrpost check` computes for this very configuration.
 
 use super::contest::BARE;
-use super::goals::{Goal, NONE, figure, spread};
-use super::observed::{ALL, watched};
+use super::goals::{Goal, NONE, figure, spread, subject};
+use super::observed::watched;
 use super::plans::FLOWS;
 use crate::tdma::bare::BareThreads;
 use crate::tdma::capture::{Arrived, Capture};
@@ -23,16 +23,14 @@ use std::time::{Duration, Instant};
 
 /// Parts of a turn, each checked for time that the hypervisor took.
 const WINDOW: Duration = Duration::from_secs(1);
-pub(super) const WITHIN: [Goal; 1] = [Goal { name: "must bound", most: 1.0 }];
-pub(super) const WITHIN_ALONE: [Goal; 1] = [Goal { name: "hoped bound", most: 1.0 }];
+const WITHIN: [Goal; 1] = [Goal { name: "must bound", most: 1.0 }];
+const WITHIN_ALONE: [Goal; 1] = [Goal { name: "hoped bound", most: 1.0 }];
 const NOT_VACUOUS: [Goal; 1] = [Goal { name: "must 3 times", most: 3.0 }];
 const STOLEN: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Flows)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("flows", None, "us", flows)]
 }
-
-struct Flows;
 
 /// One turn.
 struct FlowTurns {
@@ -45,20 +43,14 @@ struct FlowTurns {
     bare: BareThreads,
 }
 
-impl Case for Flows {
-    fn name(&self) -> String {
-        "flows".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let turn = |_| {
-            let _alone = alone()?;
-            watch(&Stage::new()?, settings)
-        };
-        match (0..settings.rounds.max(1)).map(turn).collect::<Result<Vec<_>, Failure>>() {
-            Ok(turns) => rows(&turns),
-            Err(failure) => Ok(vec![Row::alone(subject("flows", "us"), "all", Err(failure))]),
-        }
+fn flows(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let turn = |_| {
+        let _alone = alone()?;
+        watch(&Stage::new()?, settings)
+    };
+    match (0..settings.rounds.max(1)).map(turn).collect::<Result<Vec<_>, Failure>>() {
+        Ok(turns) => rows(&turns),
+        Err(failure) => Ok(vec![Row::alone(subject.clone(), "all", Err(failure))]),
     }
 }
 
@@ -66,7 +58,7 @@ fn watch(stage: &Stage, settings: &Settings) -> Result<FlowTurns, Failure> {
     let routers = Routers::start(stage, &FLOWS, Rights::RealTime, settings)?;
     let mut capture = Capture::start(stage)?;
     let traffic = Traffic::start(&routers)?;
-    routers.await_packages(&ALL, &mut capture)?;
+    routers.await_packages(&mut capture)?;
     let (counts, before) = (routers.counts()?, routers.machine());
     let talkers = Talkers::start(&routers, &FLOWS)?;
     let windows = steal_in_windows(watched(settings))?;
@@ -118,13 +110,12 @@ pub(super) fn measured(plan: &Plan, arrivals: &[&[Arrived]]) -> Result<Vec<Measu
 }
 
 fn rows(turns: &[FlowTurns]) -> Result<Vec<Row>, Failure> {
-    let mut late_us: Vec<f64> = turns.iter().flat_map(|turn| turn.bare.late_us.iter().copied()).collect();
-    let wake_up_us = Summary::of(&mut late_us).and_then(|summary| summary.p999).unwrap_or_default();
+    let wake_up_us = p999(turns.iter().flat_map(|turn| turn.bare.late_us.iter().copied())).unwrap_or_default();
     let mut rows = Vec::new();
     let arrivals: Vec<&[Arrived]> = turns.iter().map(|turn| turn.arrivals.as_slice()).collect();
-    for Measured { name, bound_us, mut latencies_us } in measured(&FLOWS, &arrivals)? {
+    for Measured { name, bound_us, latencies_us } in measured(&FLOWS, &arrivals)? {
         let case = format!("flows, {name}");
-        let Some(p999_us) = Summary::of(&mut latencies_us).and_then(|summary| summary.p999) else {
+        let Some(p999_us) = p999(latencies_us.iter().copied()) else {
             let failure = Failure::Failed("nothing of it came".into());
             rows.push(Row::alone(subject(&case, "us"), "measured", Err(failure)));
             continue;
@@ -133,19 +124,13 @@ fn rows(turns: &[FlowTurns]) -> Result<Vec<Row>, Failure> {
         let beyond_percent = beyond as f64 * 100.0 / latencies_us.len() as f64;
         rows.extend(spread(&subject(&case, "us"), "measured", latencies_us.clone()));
         rows.extend(figure(&subject(&case, "us"), "bound", &[bound_us], &[]));
-        for (unit, most_us, goals) in
-            [("of bound and wake-up", bound_us + wake_up_us, &WITHIN), ("of bound", bound_us, &WITHIN_ALONE)]
-        {
-            rows.extend(figure(&subject(&format!("{case}, p99.9"), unit), "measured", &[p999_us / most_us], goals));
-        }
+        rows.extend(beside_bound(&case, "measured", p999_us, bound_us, wake_up_us));
         rows.extend(figure(&subject(&format!("{case}, beyond bound"), "%"), "measured", &[beyond_percent], &[]));
         // Packages take longer when a slot was omitted; with these, any bound would look close.
-        let mut within_us: Vec<f64> =
-            latencies_us.iter().copied().filter(|latency_us| *latency_us <= bound_us).collect();
-        let vacuous =
-            Summary::of(&mut within_us).and_then(|summary| summary.p999).map(|within_us| bound_us / within_us);
-        let vacuous: Vec<f64> = vacuous.into_iter().collect();
-        rows.extend(figure(&subject(&format!("{case}, bound"), "of p99.9 within"), "bound", &vacuous, &NOT_VACUOUS));
+        let within_us = p999(latencies_us.iter().copied().filter(|latency_us| *latency_us <= bound_us));
+        let vacuous = within_us.map(|within_us| bound_us / within_us);
+        let subject = subject(&format!("{case}, bound"), "of p99.9 within");
+        rows.extend(figure(&subject, "bound", vacuous.as_slice(), &NOT_VACUOUS));
     }
     let published: u64 = turns.iter().map(|turn| turn.talked.published).sum();
     let lost = published - turns.iter().map(|turn| turn.talked.taken).sum::<u64>().min(published);
@@ -157,6 +142,26 @@ fn rows(turns: &[FlowTurns]) -> Result<Vec<Row>, Failure> {
     rows.extend(figure(&subject("flows, wake-up p99.9", "us"), BARE, &[wake_up_us], &[]));
     rows.extend(steal_rows(turns));
     Ok(rows)
+}
+
+/// The 99.9 % quantile; none of none.
+pub(super) fn p999(samples: impl Iterator<Item = f64>) -> Option<f64> {
+    Summary::of(&mut samples.collect::<Vec<_>>())?.p999
+}
+
+/// The slowest of a thousand packages of a flow, beside its bound and what waking up takes.
+pub(super) fn beside_bound(
+    case: &str,
+    contender: &'static str,
+    p999_us: f64,
+    bound_us: f64,
+    wake_up_us: f64,
+) -> Vec<Row> {
+    let row = |unit, most_us: f64, goals| {
+        figure(&subject(&format!("{case}, p99.9"), unit), contender, &[p999_us / most_us], goals)
+    };
+    let within = row("of bound and wake-up", bound_us + wake_up_us, &WITHIN);
+    [within, row("of bound", bound_us, &WITHIN_ALONE)].concat()
 }
 
 /// Slots of each turn that threads which only wake up would omit.
@@ -174,8 +179,4 @@ fn steal_rows(turns: &[FlowTurns]) -> Vec<Row> {
     rows.extend(spread(&subject("flows, steal in these", "%"), "all", stolen_from));
     rows.extend(figure(&subject("flows, run delay", "ms/s"), "all", median(waited).as_slice(), &[]));
     rows
-}
-
-fn subject(case: &str, unit: &'static str) -> Subject {
-    Subject { case: case.into(), bytes: None, unit }
 }

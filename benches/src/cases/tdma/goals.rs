@@ -27,6 +27,11 @@ pub(super) fn figure(subject: &Subject, contender: &'static str, rounds: &[f64],
     if goals.is_empty() { vec![row(None)] } else { goals.iter().map(Some).map(row).collect() }
 }
 
+/// A row's case and unit; its figures are of no size.
+pub(super) fn subject(case: &str, unit: &'static str) -> Subject {
+    Subject { case: case.into(), bytes: None, unit }
+}
+
 /// Many figures of all rounds, for information. None without any.
 pub(super) fn spread(subject: &Subject, contender: &'static str, mut samples: Vec<f64>) -> Option<Row> {
     Some(Row::alone(subject.clone(), contender, Ok(Summary::of(&mut samples)?)))

@@ -17,7 +17,7 @@ mod takeover;
 use rohrpost_bench_local::Case;
 
 /// All cases, in the order in which they are measured.
-pub fn all() -> Vec<Box<dyn Case>> {
+pub fn all() -> Vec<Case> {
     let all = [
         slots::cases(),
         brisk::cases(),

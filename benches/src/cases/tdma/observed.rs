@@ -7,7 +7,7 @@ use crate::tdma::kept::Kept;
 use crate::tdma::plan::{PORT, Plan};
 use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
-use crate::tdma::stage::{NODES, Stage};
+use crate::tdma::stage::Stage;
 use crate::tdma::traffic::Traffic;
 use rohrpost_bench_local::harness::{Failure, rest};
 use rohrpost_bench_local::settings::Settings;
@@ -22,9 +22,6 @@ const SETTLES: Duration = Duration::from_secs(1);
 
 /// Of packages and of time.
 pub(super) const PORTS: [u16; 2] = [PORT, PORT + 1];
-
-/// All nodes.
-pub(super) const ALL: [u8; NODES as usize] = [0, 1, 2];
 
 /// How routers run in a turn.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +63,7 @@ impl Observed {
         let routers = Routers::start(stage, plan, way.rights, settings)?;
         let mut capture = Capture::start(stage)?;
         let _traffic = Traffic::start(&routers)?;
-        routers.await_packages(&ALL, &mut capture)?;
+        routers.await_packages(&mut capture)?;
         let _load = way.loaded.then(|| stage.load()).transpose()?;
         let junk = way.junk.then(|| stage.junk(&PORTS)).transpose()?;
         rest(SETTLES)?;

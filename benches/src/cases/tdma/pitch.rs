@@ -4,14 +4,13 @@
 
 use super::contest::{ALWAYS, Contest, Figure, Held, WatchedContender};
 use super::goals::{Goal, NONE, figure};
-use super::observed::{Observed, RunConditions};
+use super::observed::Observed;
 use super::plans::{SHORT_PITCH, SHORTEST_PITCH, WIDE_GUARD};
 use super::slots::{OMITTED, OMITTED_MUST};
 use crate::tdma::plan::Plan;
-use crate::tdma::rights::Rights;
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::Failure;
-use rohrpost_bench_local::rounds::Row;
+use rohrpost_bench_local::rounds::{Row, Subject};
 use rohrpost_bench_local::settings::Settings;
 
 const INTO_GUARD: Figure =
@@ -21,49 +20,32 @@ const INTO_GUARD: Figure =
 const PITCH: [Goal; 2] = [Goal { name: "must 250 us", most: 250.0 }, Goal { name: "hoped 200 us", most: 200.0 }];
 const GUARD: [Goal; 2] = [Goal { name: "must 150 us", most: 150.0 }, Goal { name: "hoped 100 us", most: 100.0 }];
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Pitch)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("pitch", None, "us", pitch)]
 }
 
-struct Pitch;
-
-impl Case for Pitch {
-    fn name(&self) -> String {
-        "pitch".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |contender, plan| WatchedContender {
-            contender,
-            plan,
-            way: RunConditions { rights: Rights::RealTime, loaded: true, junk: false },
-        };
-        let tables = [
-            ("250 us, guard 80", SHORT_PITCH),
-            ("320 us, guard 150", WIDE_GUARD),
-            ("210 us, guard 40", SHORTEST_PITCH),
-        ];
-        let contest = Contest {
-            case: "pitch",
-            watched: tables.map(|(contender, plan)| watched(contender, plan)).into(),
-            with_goals: tables.len(),
-            bounds: Vec::new(),
-            versus: Vec::new(),
-            figures: [&[INTO_GUARD, OMITTED][..], &ALWAYS[..]].concat(),
-        };
-        let Held { mut rows, seen, .. } = contest.hold(settings);
-        for ((contender, plan), seen) in tables.into_iter().zip(seen) {
-            let not_kept: Vec<f64> = seen.iter().map(|seen| if is_kept(&plan, seen) { 0.0 } else { 100.0 }).collect();
-            rows.extend(figure(&contest.subject("%", Some("not kept")), contender, &not_kept, &NONE));
-            // A round that failed has a row of its own.
-            if not_kept.len() == settings.rounds.max(1) && not_kept.iter().all(|percent| *percent == 0.0) {
-                let Plan { pitch_us, guard_us, .. } = plan;
-                rows.extend(figure(&contest.subject("us", Some("slot")), contender, &[pitch_us as f64], &PITCH));
-                rows.extend(figure(&contest.subject("us", Some("guard")), contender, &[guard_us as f64], &GUARD));
-            }
+fn pitch(settings: &Settings, _: &Subject) -> Result<Vec<Row>, Failure> {
+    let tables =
+        [("250 us, guard 80", SHORT_PITCH), ("320 us, guard 150", WIDE_GUARD), ("210 us, guard 40", SHORTEST_PITCH)];
+    let contest = Contest {
+        case: "pitch",
+        watched: tables.map(|(contender, plan)| WatchedContender::new(contender, plan, true)).into(),
+        with_goals: tables.len(),
+        bounds: Vec::new(),
+        figures: [&[INTO_GUARD, OMITTED][..], &ALWAYS[..]].concat(),
+    };
+    let Held { mut rows, seen, .. } = contest.hold(settings);
+    for ((contender, plan), seen) in tables.into_iter().zip(seen) {
+        let not_kept: Vec<f64> = seen.iter().map(|seen| if is_kept(&plan, seen) { 0.0 } else { 100.0 }).collect();
+        rows.extend(figure(&contest.subject("%", Some("not kept")), contender, &not_kept, &NONE));
+        // A round that failed has a row of its own.
+        if not_kept.len() == settings.rounds.max(1) && not_kept.iter().all(|percent| *percent == 0.0) {
+            let Plan { pitch_us, guard_us, .. } = plan;
+            rows.extend(figure(&contest.subject("us", Some("slot")), contender, &[pitch_us as f64], &PITCH));
+            rows.extend(figure(&contest.subject("us", Some("guard")), contender, &[guard_us as f64], &GUARD));
         }
-        Ok(rows)
     }
+    Ok(rows)
 }
 
 /// Whether nobody sent where it must not, and hardly a slot was left out.

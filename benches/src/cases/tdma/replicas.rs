@@ -6,9 +6,9 @@
 //! ```
 //! Nobody floods: what is not declared would leave before parts.
 
-use super::flows::{Measured, WITHIN, WITHIN_ALONE, measured};
-use super::goals::{NONE, figure};
-use super::observed::{ALL, watched};
+use super::flows::{Measured, beside_bound, measured, p999};
+use super::goals::{NONE, figure, subject};
+use super::observed::watched;
 use super::plans::REPLICAS;
 use super::slots::OMITTED;
 use crate::tdma::bare::BareThreads;
@@ -37,11 +37,9 @@ const PROMISED: &str = "check";
 /// Past a replicated flood, beside unloaded: of the most urgent flow.
 const URGENT: Versus = Versus { name: WITHOUT, p50: Some(Target::AtMost(1.5)), p99: Some(Target::AtMost(2.0)) };
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Replicas)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("replicas", None, "us", replicas)]
 }
-
-struct Replicas;
 
 /// One turn.
 struct ReplicaTurn {
@@ -59,25 +57,19 @@ struct ReplicaRound {
     late_us: Vec<f64>,
 }
 
-impl Case for Replicas {
-    fn name(&self) -> String {
-        "replicas".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let round = |number: usize| {
-            let (_alone, stage) = (alone()?, Stage::new()?);
-            // Each round begins with the other.
-            let first = watch(&stage, settings, number.is_multiple_of(2))?;
-            let second = watch(&stage, settings, !number.is_multiple_of(2))?;
-            let (beside, without) = if number.is_multiple_of(2) { (first, second) } else { (second, first) };
-            let late_us = BareThreads::turn(&stage, &REPLICAS, false, watched(settings))?.late_us;
-            Ok(ReplicaRound { beside, without, late_us })
-        };
-        match (0..settings.rounds.max(1)).map(round).collect::<Result<Vec<_>, Failure>>() {
-            Ok(rounds) => rows(&rounds),
-            Err(failure) => Ok(vec![Row::alone(subject("replicas", "us"), BESIDE, Err(failure))]),
-        }
+fn replicas(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let round = |number: usize| {
+        let (_alone, stage) = (alone()?, Stage::new()?);
+        // Each round begins with the other.
+        let first = watch(&stage, settings, number.is_multiple_of(2))?;
+        let second = watch(&stage, settings, !number.is_multiple_of(2))?;
+        let (beside, without) = if number.is_multiple_of(2) { (first, second) } else { (second, first) };
+        let late_us = BareThreads::turn(&stage, &REPLICAS, false, watched(settings))?.late_us;
+        Ok(ReplicaRound { beside, without, late_us })
+    };
+    match (0..settings.rounds.max(1)).map(round).collect::<Result<Vec<_>, Failure>>() {
+        Ok(rounds) => rows(&rounds),
+        Err(failure) => Ok(vec![Row::alone(subject.clone(), BESIDE, Err(failure))]),
     }
 }
 
@@ -92,7 +84,7 @@ fn watch(stage: &Stage, settings: &Settings, with_records: bool) -> Result<Repli
     let routers = Routers::start(stage, &REPLICAS, Rights::RealTime, settings)?;
     let mut capture = Capture::start(stage)?;
     let traffic = Traffic::start(&routers)?;
-    routers.await_packages(&ALL, &mut capture)?;
+    routers.await_packages(&mut capture)?;
     drop(traffic);
     let each = Duration::from_secs_f64(1.0 / (OFFERED * promised()?));
     let shape = REPLICAS.records.filter(|_| with_records);
@@ -115,8 +107,7 @@ fn watch(stage: &Stage, settings: &Settings, with_records: bool) -> Result<Repli
 
 fn rows(rounds: &[ReplicaRound]) -> Result<Vec<Row>, Failure> {
     let mut rows = record_rows(rounds)?;
-    let mut late_us: Vec<f64> = rounds.iter().flat_map(|round| round.late_us.iter().copied()).collect();
-    let wake_up_us = Summary::of(&mut late_us).and_then(|summary| summary.p999).unwrap_or_default();
+    let wake_up_us = p999(rounds.iter().flat_map(|round| round.late_us.iter().copied())).unwrap_or_default();
     let each = rounds.iter().map(|round| {
         let of = |turn: &ReplicaTurn| measured(&REPLICAS, &[&turn.arrivals]);
         Ok([of(&round.beside)?, of(&round.without)?])
@@ -179,16 +170,9 @@ fn flow_rows(name: &str, versus: Option<Versus>, rounds: &[[&Measured; 2]], wake
     let bound_us = rounds.first().map_or(0.0, |[beside, _]| beside.bound_us);
     rows.extend(figure(&subject(&case, "us"), "bound", &[bound_us], &[]));
     for (contender, at) in [(BESIDE, 0), (WITHOUT, 1)] {
-        let p999_us = Summary::of(&mut all(at).collect::<Vec<_>>()).and_then(|summary| summary.p999);
-        let bounds = [("of bound and wake-up", bound_us + wake_up_us, &WITHIN), ("of bound", bound_us, &WITHIN_ALONE)];
-        for (unit, most_us, goals) in bounds {
-            let ratio: Vec<f64> = p999_us.iter().map(|p999_us| p999_us / most_us).collect();
-            rows.extend(figure(&subject(&format!("{case}, p99.9"), unit), contender, &ratio, goals));
+        if let Some(p999_us) = p999(all(at)) {
+            rows.extend(beside_bound(&case, contender, p999_us, bound_us, wake_up_us));
         }
     }
     rows
-}
-
-fn subject(case: &str, unit: &'static str) -> Subject {
-    Subject { case: case.into(), bytes: None, unit }
 }

@@ -9,7 +9,7 @@ use crate::tdma::bare::BareThreads;
 use crate::tdma::rights::Rights;
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::Failure;
-use rohrpost_bench_local::rounds::{Row, Target, Versus};
+use rohrpost_bench_local::rounds::{Row, Subject, Target, at_most};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::Summary;
 
@@ -60,58 +60,39 @@ const FIGURES: [Figure; 3] = [
 const FEWER: [Goal; 2] =
     [Goal { name: "must 1/50", most: 1.0 / 50.0 }, Goal { name: "hoped 1/100", most: 1.0 / 100.0 }];
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Slots)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("slots", None, "us", slots)]
 }
 
-struct Slots;
-
-impl Case for Slots {
-    fn name(&self) -> String {
-        "slots".into()
+fn slots(settings: &Settings, _: &Subject) -> Result<Vec<Row>, Failure> {
+    let watched = |contender, loaded| WatchedContender::new(contender, LOADED, loaded);
+    let ordinary = watched(ORDINARY, true).beside(&[[None; 2]]);
+    let way = RunConditions { rights: Rights::Ordinary, ..ordinary.way };
+    let contest = Contest {
+        case: "slots",
+        watched: vec![
+            watched("loaded", true),
+            watched(UNLOADED, false).beside(&[[None, Some(Target::AtMost(2.5))], [None, Some(Target::AtMost(1.5))]]),
+            WatchedContender { way, ..ordinary },
+        ],
+        with_goals: 1,
+        bounds: [MUST, HOPED].map(|(name, bounds)| (name, bounds, [at_most(1.0); 2])).into(),
+        figures: [&FIGURES[..], &ALWAYS[..]].concat(),
+    };
+    let Held { mut rows, seen, bare } = contest.hold(settings);
+    let [loaded, _, ordinary] = seen.as_slice() else { return Ok(rows) };
+    let not_kept_subject = contest.subject("of ordinary", Some(NOT_KEPT));
+    let floor: Vec<f64> = bare.iter().zip(ordinary).map(|(bare, ordinary)| floor(bare, ordinary)).collect();
+    rows.extend(figure(&not_kept_subject, BARE, &floor, &FEWER));
+    for (what, far) in [("over 250 us off", far_off as Far), (NOT_KEPT, not_kept)] {
+        rows.extend(figure(
+            &contest.subject("of ordinary", Some(what)),
+            "loaded",
+            &ratios(loaded, ordinary, far),
+            &FEWER,
+        ));
     }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |contender, rights, loaded| WatchedContender {
-            contender,
-            plan: LOADED,
-            way: RunConditions { rights, loaded, junk: false },
-        };
-        let at_most = |p50: Option<f64>, p99: f64| (p50.map(Target::AtMost), Some(Target::AtMost(p99)));
-        let versus = [
-            (MUST.0, at_most(Some(1.0), 1.0)),
-            (HOPED.0, at_most(Some(1.0), 1.0)),
-            (UNLOADED, at_most(None, 2.5)),
-            (UNLOADED, at_most(None, 1.5)),
-            (ORDINARY, (None, None)),
-        ];
-        let contest = Contest {
-            case: "slots",
-            watched: vec![
-                watched("loaded", Rights::RealTime, true),
-                watched(UNLOADED, Rights::RealTime, false),
-                watched(ORDINARY, Rights::Ordinary, true),
-            ],
-            with_goals: 1,
-            bounds: vec![MUST, HOPED],
-            versus: versus.map(|(name, (p50, p99))| Versus { name, p50, p99 }).into(),
-            figures: [&FIGURES[..], &ALWAYS[..]].concat(),
-        };
-        let Held { mut rows, seen, bare } = contest.hold(settings);
-        let [loaded, _, ordinary] = seen.as_slice() else { return Ok(rows) };
-        let not_kept_subject = contest.subject("of ordinary", Some(NOT_KEPT));
-        let floor: Vec<f64> = bare.iter().zip(ordinary).map(|(bare, ordinary)| floor(bare, ordinary)).collect();
-        rows.extend(figure(&not_kept_subject, BARE, &floor, &FEWER));
-        for (what, far) in [("over 250 us off", far_off as Far), (NOT_KEPT, not_kept)] {
-            rows.extend(figure(
-                &contest.subject("of ordinary", Some(what)),
-                "loaded",
-                &ratios(loaded, ordinary, far),
-                &FEWER,
-            ));
-        }
-        Ok(rows)
-    }
+    Ok(rows)
 }
 
 /// Slots that were not kept, of how many.

@@ -2,8 +2,7 @@
 //! the master.
 
 use super::contest::BARE;
-use super::goals::{Goal, figure, spread};
-use super::observed::ALL;
+use super::goals::{Goal, figure, spread, subject};
 use super::plans::LOADED;
 use crate::tdma::bare::BareThreads;
 use crate::tdma::capture::Capture;
@@ -44,11 +43,9 @@ const STEP: [Goal; 1] = [Goal { name: "hoped 5 us", most: 5.0 }];
 const FALSE: [Goal; 2] = [Goal { name: "must 1", most: 1.0 }, Goal { name: "hoped none", most: 0.0 }];
 const WITHOUT_SYNC: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Takeover)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("takeover", None, "cycles", takeover)]
 }
-
-struct Takeover;
 
 /// Of all rounds.
 #[derive(Default)]
@@ -62,22 +59,16 @@ struct Found {
     without_sync: Vec<f64>,
 }
 
-impl Case for Takeover {
-    fn name(&self) -> String {
-        "takeover".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let mut found = Found::default();
-        let watched = (0..settings.rounds.max(1)).try_for_each(|_| {
-            let _alone = alone()?;
-            watch(&Stage::new()?, settings, &mut found)
-        });
-        Ok(match watched {
-            Ok(()) => found.rows(),
-            Err(failure) => vec![Row::alone(subject("takeover", "cycles"), "all", Err(failure))],
-        })
-    }
+fn takeover(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let mut found = Found::default();
+    let watched = (0..settings.rounds.max(1)).try_for_each(|_| {
+        let _alone = alone()?;
+        watch(&Stage::new()?, settings, &mut found)
+    });
+    Ok(match watched {
+        Ok(()) => found.rows(),
+        Err(failure) => vec![Row::alone(subject.clone(), "all", Err(failure))],
+    })
 }
 
 fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Failure> {
@@ -85,7 +76,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
     let mut routers = Routers::start(stage, &LOADED, Rights::RealTime, settings)?;
     let mut capture = Capture::start(stage)?;
     let traffic = Traffic::start(&routers)?;
-    routers.await_packages(&ALL, &mut capture)?;
+    routers.await_packages(&mut capture)?;
     let mut found_here = Vec::new();
     // With few kills the same master may die each time, when masters change by themselves.
     let both_died = |killed: &[TakenOver]| (0..).zip(DEAD).all(|(dead, _)| killed.iter().any(|kill| kill.dead == dead));
@@ -96,7 +87,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
         let taken_over = kill_master(&mut routers, &mut capture, &LOADED, (kill as f64 * GOLDEN).fract())?;
         routers.start_again(taken_over.dead)?;
         // A returning node listens, follows, and sends again.
-        routers.await_packages(&ALL, &mut capture)?;
+        routers.await_packages(&mut capture)?;
         found_here.push(taken_over);
     }
     found.killed.append(&mut found_here);
@@ -159,10 +150,6 @@ impl Found {
         rows.extend(figure(&subject("takeover, kills", "kills"), "all", &[self.killed.len() as f64], &[]));
         rows
     }
-}
-
-fn subject(case: &str, unit: &'static str) -> Subject {
-    Subject { case: case.into(), bytes: None, unit }
 }
 
 #[cfg(test)]

@@ -7,6 +7,6 @@ mod readers;
 use rohrpost_bench_local::Case;
 
 /// All cases of this folder.
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
+pub(super) fn cases() -> Vec<Case> {
     [rate::cases(), hop::cases(), readers::cases()].into_iter().flatten().collect()
 }

@@ -1,13 +1,14 @@
 //! What crosses the wire for ten readers of one replica on one node, beside what crosses it for one: each record once.
 
-use crate::cases::lan::ground::{LanSegment, replicating};
-use crate::lan::flow::{FILLER, Inlet, Outlet, SILENCE, checked, put_number};
-use crate::lan::nodes::index;
+use crate::cases::lan::ground::LanSegment;
+use crate::lan::flow::{FILLER, Outlet, SILENCE, checked, put_number};
+use crate::lan::nodes::{Network, UNPACED, index};
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::sent::Sent;
+use crate::one_way::Sink;
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Child, End, Failure, Gate, Shared, Zeroable};
-use rohrpost_bench_local::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
 use rohrpost_bench_local::statistics::{Summary, median};
 use rohrpost_mailbox::StreamShape;
@@ -31,45 +32,37 @@ const ALL: &str = "rohrpost";
 const ONE: &str = "one reader";
 const ONCE: &str = "its bytes";
 
-pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(ReplicaReaders)]
+pub(super) fn cases() -> Vec<Case> {
+    vec![Case::new("replica, ten readers", BYTES, "B", replica_readers)]
 }
 
-struct ReplicaReaders;
-
-impl Case for ReplicaReaders {
-    fn name(&self) -> String {
-        "replica, ten readers".into()
-    }
-
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = LanSegment::new(settings, &replicating(SHAPE));
-        let records = settings.count(RECORDS) as u64;
-        let packets = RefCell::new(Vec::new());
-        let read_by = |contender, readers| {
-            let (ground, packets) = (&ground, &packets);
-            Contender::single(contender, move || {
-                let sent = watch(ground, readers, records)?;
-                packets.borrow_mut().push((contender, sent.packets as f64 / records as f64));
-                Ok(sent.bytes as f64 / records as f64)
-            })
-        };
-        let contenders = [read_by(ALL, READERS), read_by(ONE, 1), Contender::single(ONCE, || Ok(BYTES as f64))];
-        let versus = [
-            // Descriptions and what routers say to each other are in both.
-            Versus { name: ONE, p50: Some(Target::AtMost(1.02)), p99: None },
-            Versus { name: ONCE, p50: None, p99: None },
-        ];
-        let subject = |case: String, unit| Subject { case, bytes: Some(BYTES), unit };
-        let mut rows = compare(settings, &subject(self.name(), "B"), &contenders, &versus);
-        let packets = packets.borrow();
-        rows.extend([ALL, ONE].into_iter().filter_map(|contender| {
-            let own = packets.iter().filter(|(name, _)| *name == contender).map(|(_, packets)| *packets);
-            let figure = Summary::single(median(own)?);
-            Some(Row::alone(subject(format!("{}, packets", self.name()), "a record"), contender, Ok(figure)))
-        }));
-        Ok(rows)
-    }
+fn replica_readers(settings: &Settings, subject: &Subject) -> Result<Vec<Row>, Failure> {
+    let ground = LanSegment::new(settings, &Network { records: Some(SHAPE), ..UNPACED });
+    let records = settings.count(RECORDS) as u64;
+    let packets = RefCell::new(Vec::new());
+    let read_by = |contender, readers| {
+        let (ground, packets) = (&ground, &packets);
+        Contender::single(contender, move || {
+            let sent = watch(ground, readers, records)?;
+            packets.borrow_mut().push((contender, sent.packets as f64 / records as f64));
+            Ok(sent.bytes as f64 / records as f64)
+        })
+    };
+    let contenders = [
+        read_by(ALL, READERS),
+        // Descriptions and what routers say to each other are in both.
+        read_by(ONE, 1).beside(at_most(1.02), None),
+        Contender::fixed(ONCE, Summary::single(BYTES as f64)).beside(None, None),
+    ];
+    let mut rows = compare(settings, subject, &contenders);
+    let packets = packets.borrow();
+    rows.extend([ALL, ONE].into_iter().filter_map(|contender| {
+        let own = packets.iter().filter(|(name, _)| *name == contender).map(|(_, packets)| *packets);
+        let case = format!("{}, packets", subject.case);
+        let subject = Subject { case, bytes: Some(BYTES), unit: "a record" };
+        Some(Row::alone(subject, contender, Ok(Summary::single(median(own)?))))
+    }));
+    Ok(rows)
 }
 
 #[repr(C)]
