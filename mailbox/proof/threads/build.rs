@@ -15,8 +15,9 @@ mod caught;
 #[path = "../loom/src/stream_broken.rs"]
 mod stream_broken;
 
-use broken::{Broken, Edit};
+use broken::Broken;
 use caught::{CAUGHT, STREAM_CAUGHT};
+use rohrpost_planted::Variants;
 
 /// Files of this crate; the others are the mailbox's.
 const OURS: [&str; 3] = ["rig", "runs", "stream_rig"];
@@ -62,59 +63,19 @@ fn main() {
 }
 
 fn generate(out: &Path) -> String {
-    fs::write(out.join("name.rs"), plain(&source("name"))).expect("OUT_DIR can be written");
+    let copies = Variants { sources: "../../src", ours: &OURS, out };
+    copies.copy("name");
     let (mut modules, mut table) =
         (String::new(), String::from("pub(crate) const BROKEN: &[(&str, &str, fn())] = &[\n"));
     for proof in &PROOFS {
-        let runs = last(proof.parts.last().expect("a proof has runs"));
-        modules.push_str(&variant(out, proof.parts, proof.real, &[]));
+        let runs = proof.parts.last().expect("a proof has runs");
+        modules.push_str(&copies.variant(proof.parts, proof.real, &[], ""));
         for (name, run) in proof.caught {
             let broken = proof.broken.iter().copied().flatten().find(|broken| broken.name == *name);
             let broken = broken.unwrap_or_else(|| panic!("caught.rs names {name}, which ../loom/src has no more"));
-            modules.push_str(&variant(out, proof.parts, name, broken.edits));
+            modules.push_str(&copies.variant(proof.parts, name, broken.edits, ""));
             writeln!(table, "({name:?}, {run:?}, {name}::{runs}::{run}),").expect("a String takes all");
         }
     }
     modules + &table + "];\n"
-}
-
-/// Writes the files of a variant, and returns its module.
-fn variant(out: &Path, parts: &[&str], name: &str, edits: &[Edit]) -> String {
-    fs::create_dir_all(out.join(name)).expect("OUT_DIR can be written");
-    let mut module = format!("pub(crate) mod {name} {{\n");
-    for part in parts {
-        let mut text = plain(&source(part));
-        for edit in edits.iter().filter(|edit| edit.file == *part) {
-            let found = text.matches(edit.from).count();
-            assert_eq!(found, 1, "variant {name}: {part}.rs must have this once, not {found} times:\n{}", edit.from);
-            text = text.replacen(edit.from, edit.to, 1);
-        }
-        for part in parts {
-            text = text.replace(&format!("crate::{}::", part.replace('/', "::")), &format!("super::{}::", last(part)));
-        }
-        let part = last(part);
-        let path = out.join(name).join(part).with_extension("rs");
-        fs::write(&path, text).expect("OUT_DIR can be written");
-        writeln!(module, "pub(crate) mod {part} {{ include!({path:?}); }}").expect("a String takes all");
-    }
-    let is_of_core = |edit: &Edit| parts.contains(&edit.file) && !OURS.contains(&edit.file);
-    assert!(edits.iter().all(is_of_core), "variant {name}: edits what is not of the core");
-    module + "}\n"
-}
-
-/// The name of a part's module: that of its file.
-fn last(part: &str) -> &str {
-    part.rsplit('/').next().unwrap_or(part)
-}
-
-fn source(part: &str) -> String {
-    let folder = if OURS.contains(&part) { "src" } else { "../../src" };
-    let path = format!("{folder}/{part}.rs");
-    fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
-}
-
-/// Without unit tests, and without the first comment, which an included file may not have. CacheLine numbers stay.
-fn plain(source: &str) -> String {
-    let end = source.find("#[cfg(test)]\nmod tests {").unwrap_or(source.len());
-    source[..end].lines().map(|line| line.replacen("//!", "// ", usize::from(line.starts_with("//!"))) + "\n").collect()
 }

@@ -1,6 +1,6 @@
 //! The names of the cells' models, and the variants of `cell.rs` that must fail in one of them.
 
-use super::broken::{Broken, Edit};
+use super::broken::{Broken, Edit, broken};
 
 /// Each model and the bound on its preemptions.
 pub(crate) const MODELS: &[(&str, usize)] = &[
@@ -15,11 +15,7 @@ const TORN: &str = "torn";
 const OTHER_VERSION: &str = "a value of another version";
 
 const fn edit(from: &'static str, to: &'static str) -> Edit {
-    Edit { file: "cell", from, to }
-}
-
-const fn broken(name: &'static str, edits: &'static [Edit], caught_by: &'static str, says: &'static str) -> Broken {
-    Broken { name, edits, caught_by, says }
+    rohrpost_planted::edit("cell", from, to)
 }
 
 pub(crate) const BROKEN: &[Broken] = &[

@@ -3,8 +3,14 @@
 use crate::cell::{SeqCount, SeqLatch};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU64, Ordering};
-use loom::thread;
+use loom::thread::{self, JoinHandle};
 use std::sync::Arc;
+
+/// Does something with a cell on a thread of its own.
+fn beside<C: 'static, R: 'static>(cell: &Arc<C>, act: impl FnOnce(&C) -> R + 'static) -> JoinHandle<R> {
+    let cell = cell.clone();
+    thread::spawn(move || act(&cell))
+}
 
 /// Both words of a value are the same number.
 #[derive(Default)]
@@ -54,10 +60,7 @@ impl InPlace {
 /// The writer writes 1 and 2 while a reader reads: it gets a whole value, of the version that it is told, or nothing.
 pub(crate) fn a_value_is_read_whole() {
     let cell = Arc::new(InPlace::default());
-    let writer = {
-        let cell = cell.clone();
-        thread::spawn(move || [1, 2].into_iter().for_each(|value| cell.write(value)))
-    };
+    let writer = beside(&cell, |cell| [1, 2].into_iter().for_each(|value| cell.write(value)));
     if let Some((version, value)) = cell.read() {
         assert_eq!(u64::from(version), 2 * value, "a value of another version");
     }
@@ -71,10 +74,7 @@ pub(crate) fn a_successor_completes_what_the_dead_left() {
     cell.write(1);
     assert!(dies_at("words: stored", || cell.write(2)));
     assert_eq!(cell.read(), None);
-    let successor = {
-        let cell = cell.clone();
-        thread::spawn(move || cell.write(3))
-    };
+    let successor = beside(&cell, |cell| cell.write(3));
     assert!(cell.read().is_none_or(|read| read == (4, 3)));
     successor.join().unwrap();
     assert_eq!(cell.read(), Some((4, 3)));
@@ -106,10 +106,7 @@ impl Latched {
 pub(crate) fn a_latched_value_is_read_whole() {
     let cell = Arc::new(Latched::default());
     cell.write(1);
-    let writer = {
-        let cell = cell.clone();
-        thread::spawn(move || [2, 3].into_iter().for_each(|value| cell.write(value)))
-    };
+    let writer = beside(&cell, |cell| [2, 3].into_iter().for_each(|value| cell.write(value)));
     if let Some(value) = cell.read(1) {
         assert!((1..=3).contains(&value), "{value} was never published");
     }
@@ -121,10 +118,7 @@ pub(crate) fn a_latched_value_is_read_whole() {
 pub(crate) fn a_latched_value_stays_readable() {
     let cell = Arc::new(Latched::default());
     cell.write(1);
-    let writer = {
-        let cell = cell.clone();
-        thread::spawn(move || cell.fill(2))
-    };
+    let writer = beside(&cell, |cell| cell.fill(2));
     assert_eq!(cell.read(1), Some(1));
     writer.join().unwrap();
     assert_eq!(cell.read(1), Some(1));
@@ -136,10 +130,7 @@ pub(crate) fn a_latched_value_outlives_its_writer() {
     cell.write(1);
     assert!(dies_at("words: stored", || cell.write(2)));
     assert_eq!(cell.read(1), Some(1));
-    let successor = {
-        let cell = cell.clone();
-        thread::spawn(move || cell.write(3))
-    };
+    let successor = beside(&cell, |cell| cell.write(3));
     assert!(matches!(cell.read(2), Some(1 | 3)));
     successor.join().unwrap();
     assert_eq!(cell.read(1), Some(3));

@@ -1,6 +1,7 @@
 //! The names of the models of streams, and the variants of their core that must fail in one of them.
 
-use super::broken::{Broken, Edit};
+use super::broken::{Broken, ENDLESS, Edit, RACE, broken};
+use rohrpost_planted::edit;
 
 /// Each model and the bound on its preemptions.
 pub(crate) const MODELS: &[(&str, usize)] = &[
@@ -24,17 +25,9 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
 ];
 
 const TORN: &str = "torn";
-/// Two threads touch plain memory, and nothing orders them.
-const RACE: &str = "Causality violation";
-/// The reader sleeps for ever: nobody will ring.
-const ENDLESS: &str = "maximum number of branches";
 const LOST: &str = "a finished record is lost, or an unfinished one is none";
 const CAUSE: &str = "a cause is wrong";
 const NO_FRAME: &str = "there always is a free frame";
-
-const fn edit(file: &'static str, from: &'static str, to: &'static str) -> Edit {
-    Edit { file, from, to }
-}
 
 const fn ring(from: &'static str, to: &'static str) -> Edit {
     edit("stream/ring", from, to)
@@ -46,10 +39,6 @@ const fn writing(from: &'static str, to: &'static str) -> Edit {
 
 const fn left_out(from: &'static str, to: &'static str) -> Edit {
     edit("stream/left_out", from, to)
-}
-
-const fn broken(name: &'static str, edits: &'static [Edit], caught_by: &'static str, says: &'static str) -> Broken {
-    Broken { name, edits, caught_by, says }
 }
 
 const FENCE_E: &str = "comes after (C) already.\n        seq_cst_accesses();";

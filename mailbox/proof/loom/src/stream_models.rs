@@ -17,10 +17,7 @@ fn is_copied_whole(before: u64, during: u64) {
     let mut progress = Progress::resume(&stream.ring());
     stream.writes(&mut progress, before, Bytes::Racing);
     let mut reader = Reader::new(&stream, 0);
-    let writer = {
-        let stream = stream.clone();
-        thread::spawn(move || stream.writes(&mut progress, during, Bytes::Racing))
-    };
+    let writer = stream.spawn(move |stream| stream.writes(&mut progress, during, Bytes::Racing));
     reader.advance(Bytes::Racing);
     writer.join().unwrap();
     reader.settle(before + during, Bytes::Racing);
@@ -38,10 +35,7 @@ pub(crate) fn an_overwritten_copy_is_thrown_away() {
 /// A record is held in plain memory while the writer passes it: loom reports a race of the two.
 pub(crate) fn the_writer_goes_round_what_is_held() {
     let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
-    let writer = {
-        let stream = stream.clone();
-        thread::spawn(move || stream.writes(&mut progress, 2, Bytes::Plain))
-    };
+    let writer = stream.spawn(move |stream| stream.writes(&mut progress, 2, Bytes::Plain));
     stream.read(0, &lines[0], Bytes::Plain);
     writer.join().unwrap();
 }
@@ -49,10 +43,7 @@ pub(crate) fn the_writer_goes_round_what_is_held() {
 /// One record after the other is held, so that the seat names another frame right after a release.
 pub(crate) fn what_was_released_was_read() {
     let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
-    let writer = {
-        let stream = stream.clone();
-        thread::spawn(move || stream.writes(&mut progress, 2, Bytes::Plain))
-    };
+    let writer = stream.spawn(move |stream| stream.writes(&mut progress, 2, Bytes::Plain));
     lines.iter().for_each(|line| _ = stream.read(0, line, Bytes::Plain));
     writer.join().unwrap();
 }
@@ -60,10 +51,8 @@ pub(crate) fn what_was_released_was_read() {
 /// All seats are held: there still is a frame to write, and all that are kept are there.
 pub(crate) fn there_always_is_a_free_frame() {
     let (stream, mut progress, lines) = looked_at(2, Bytes::Plain);
-    let holder = {
-        let stream = stream.clone();
-        thread::spawn(move || lines.iter().enumerate().for_each(|(seat, line)| _ = stream.ring().hold(seat, line)))
-    };
+    let holder = stream
+        .spawn(move |stream| lines.iter().enumerate().for_each(|(seat, line)| _ = stream.ring().hold(seat, line)));
     stream.writes(&mut progress, 3, Bytes::Plain);
     holder.join().unwrap();
     for sequence in 3..5 {
@@ -75,15 +64,12 @@ pub(crate) fn there_always_is_a_free_frame() {
 /// first.
 fn a_writer_dies(fatal: &'static str, finished: u64, bytes: Bytes) {
     let (stream, mut progress, lines) = looked_at(1, bytes);
-    let successor = {
-        let stream = stream.clone();
-        thread::spawn(move || {
-            assert!(dies_at(fatal, || stream.writes(&mut progress, 1, bytes)));
-            let mut progress = Progress::resume(&stream.ring());
-            assert_eq!(progress.next(), finished, "a finished record is lost, or an unfinished one is none");
-            stream.writes(&mut progress, 1, bytes);
-        })
-    };
+    let successor = stream.spawn(move |stream| {
+        assert!(dies_at(fatal, || stream.writes(&mut progress, 1, bytes)));
+        let mut progress = Progress::resume(&stream.ring());
+        assert_eq!(progress.next(), finished, "a finished record is lost, or an unfinished one is none");
+        stream.writes(&mut progress, 1, bytes);
+    });
     match bytes {
         Bytes::Plain => _ = stream.read(0, &lines[0], Bytes::Plain),
         Bytes::Racing => {
@@ -112,13 +98,10 @@ pub(crate) fn a_successor_goes_round_what_is_held() {
 /// The writer of a replica leaves out more records than are kept, and then writes into what that made free.
 pub(crate) fn the_writer_goes_round_what_is_held_and_left_out() {
     let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
-    let writer = {
-        let stream = stream.clone();
-        thread::spawn(move || {
-            progress.skip_to(&stream.ring(), 5, 0);
-            stream.writes(&mut progress, 2, Bytes::Plain);
-        })
-    };
+    let writer = stream.spawn(move |stream| {
+        progress.skip_to(&stream.ring(), 5, 0);
+        stream.writes(&mut progress, 2, Bytes::Plain);
+    });
     stream.read(0, &lines[0], Bytes::Plain);
     writer.join().unwrap();
     Reader::new(&stream, 0).settle(7, Bytes::Plain);
@@ -132,13 +115,10 @@ pub(crate) fn what_was_left_out_is_told_by_cause() {
     stream.writes(&mut progress, 1, Bytes::Racing);
     let mut reader = Reader::telling(&stream, 0);
     reader.advance(Bytes::Racing);
-    let writer = {
-        let stream = stream.clone();
-        thread::spawn(move || {
-            progress.skip_to(&stream.ring(), 3, 2);
-            stream.writes(&mut progress, 1, Bytes::Racing);
-        })
-    };
+    let writer = stream.spawn(move |stream| {
+        progress.skip_to(&stream.ring(), 3, 2);
+        stream.writes(&mut progress, 1, Bytes::Racing);
+    });
     reader.advance(Bytes::Racing);
     writer.join().unwrap();
     reader.catch_up(Bytes::Racing);
@@ -151,18 +131,15 @@ pub(crate) fn what_was_left_out_is_told_by_cause() {
 /// It dies at the first that it leaves out, and its successor writes in front of a reader that holds what was before.
 pub(crate) fn a_successor_leaves_out_the_rest() {
     let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
-    let successor = {
-        let stream = stream.clone();
-        thread::spawn(move || {
-            assert!(dies_at("entry: published", || progress.skip_to(&stream.ring(), 5, 0)));
-            let mut progress = Progress::resume(&stream.ring());
-            assert_eq!(progress.next(), 4, "what was left out is not");
-            let mut reader = Reader::new(&stream, 0);
-            reader.next = 2;
-            assert!(reader.advance(Bytes::Racing), "a reader waits for what was left out");
-            stream.writes(&mut progress, 1, Bytes::Plain);
-        })
-    };
+    let successor = stream.spawn(move |stream| {
+        assert!(dies_at("entry: published", || progress.skip_to(&stream.ring(), 5, 0)));
+        let mut progress = Progress::resume(&stream.ring());
+        assert_eq!(progress.next(), 4, "what was left out is not");
+        let mut reader = Reader::new(&stream, 0);
+        reader.next = 2;
+        assert!(reader.advance(Bytes::Racing), "a reader waits for what was left out");
+        stream.writes(&mut progress, 1, Bytes::Plain);
+    });
     stream.read(0, &lines[0], Bytes::Plain);
     successor.join().unwrap();
     Reader::new(&stream, 0).settle(5, Bytes::Plain);
@@ -185,13 +162,10 @@ pub(crate) fn no_half_record_is_left() {
 pub(crate) fn a_dead_holder_costs_nothing() {
     let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
     assert!(dies_at("release: before seat", || _ = stream.read(0, &lines[0], Bytes::Plain)));
-    let next = {
-        let stream = stream.clone();
-        thread::spawn(move || {
-            stream.ring().sit_down(0, 0);
-            stream.read(0, &lines[1], Bytes::Plain);
-        })
-    };
+    let next = stream.spawn(move |stream| {
+        stream.ring().sit_down(0, 0);
+        stream.read(0, &lines[1], Bytes::Plain);
+    });
     stream.writes(&mut progress, 2, Bytes::Plain);
     next.join().unwrap();
 }
@@ -199,10 +173,7 @@ pub(crate) fn a_dead_holder_costs_nothing() {
 /// As `wait_any`: the reader sleeps until the record is there.
 pub(crate) fn no_wake_up_is_lost() {
     let stream = Stream::new(2, 1);
-    let writer = {
-        let stream = stream.clone();
-        thread::spawn(move || stream.writes(&mut Progress::resume(&stream.ring()), 1, Bytes::Racing))
-    };
+    let writer = stream.spawn(move |stream| stream.writes(&mut Progress::resume(&stream.ring()), 1, Bytes::Racing));
     let mut reader = Reader::new(&stream, 0);
     while !reader.advance(Bytes::Racing) {
         let seen = stream.rings.load(Ordering::Acquire);
@@ -228,10 +199,7 @@ pub(crate) fn a_final_answer_stays() {
     for ns in [10, 30] {
         stream.write(&mut progress, ns, Bytes::Racing);
     }
-    let writer = {
-        let stream = stream.clone();
-        thread::spawn(move || [20, 40].map(|ns| stream.write(&mut progress, ns, Bytes::Racing)))
-    };
+    let writer = stream.spawn(move |stream| [20, 40].map(|ns| stream.write(&mut progress, ns, Bytes::Racing)));
     // Of 18, 20 is the nearest after, and may come as long as 30 is the newest.
     let ask = || match around(&stream.ring(), Stamp { epoch: 1, ns: 18 }, 10) {
         Answer::Around { before, after } => Some((before.about.stamp.ns, after.about.stamp.ns)),
@@ -249,10 +217,7 @@ pub(crate) fn an_overwritten_look_says_so() {
     let stream = Stream::new(2, 1);
     let mut progress = Progress::resume(&stream.ring());
     stream.writes(&mut progress, 2, Bytes::Racing);
-    let writer = {
-        let stream = stream.clone();
-        thread::spawn(move || stream.writes(&mut progress, 1, Bytes::Racing))
-    };
+    let writer = stream.spawn(move |stream| stream.writes(&mut progress, 1, Bytes::Racing));
     match around(&stream.ring(), Stamp { epoch: 1, ns: 15 }, 0) {
         Answer::Around { before, after } => {
             assert_eq!((before.about.stamp.ns, after.about.stamp.ns), (10, 20), "not the nearest");
@@ -267,13 +232,10 @@ pub(crate) fn an_overwritten_look_says_so() {
 pub(crate) fn a_dead_sleeper_is_forgotten_alone() {
     let stream = Stream::new(2, 1);
     stream.ring().drowsy(0, 7);
-    let next = {
-        let stream = stream.clone();
-        thread::spawn(move || {
-            stream.ring().sit_down(0, 0);
-            stream.ring().drowsy(0, 8);
-        })
-    };
+    let next = stream.spawn(move |stream| {
+        stream.ring().sit_down(0, 0);
+        stream.ring().drowsy(0, 8);
+    });
     let wakes = Mutex::new(0);
     stream.seats[0].forget(7);
     reached("sleeper: forgotten");

@@ -8,6 +8,7 @@ use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};
 use crate::stream::writing::Progress;
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
 use loom::cell::UnsafeCell;
+use loom::thread::{self, JoinHandle};
 use std::sync::Arc;
 
 /// A stream with records of one number each. Each of its words follows from its sequence, and none is 0.
@@ -52,6 +53,12 @@ impl Stream {
 
     pub(crate) fn ring(&self) -> Ring<'_> {
         Ring::new(&self.written, 0, (&self.entries, &self.hints), &self.seats)
+    }
+
+    /// Does something with it on a thread of its own.
+    pub(crate) fn spawn<R: 'static>(self: &Arc<Self>, act: impl FnOnce(&Arc<Self>) -> R + 'static) -> JoinHandle<R> {
+        let stream = self.clone();
+        thread::spawn(move || act(&stream))
     }
 
     /// As `StreamWriter::write`.

@@ -15,7 +15,7 @@ extern crate self as rohrpost_fusion;
 /// Whether a mistake is made now.
 macro_rules! broken {
     ($mistake:ident) => {
-        crate::noticed::is_made(stringify!($mistake))
+        rohrpost_planted::is_made(stringify!($mistake))
     };
 }
 

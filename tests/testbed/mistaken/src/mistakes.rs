@@ -1,11 +1,9 @@
 //! Which mistake is made now.
 
+use rohrpost_planted::MISTAKE_VARIABLE;
 use std::cell::Cell;
 
 include!(concat!(env!("OUT_DIR"), "/mistake.rs"));
-
-/// Names the mistake that all threads of a process make from the beginning.
-pub const MISTAKE_VARIABLE: &str = "ROHRPOST_MISTAKE";
 
 thread_local! {
     static MADE: Cell<Option<Mistake>> = Cell::new(of_process());

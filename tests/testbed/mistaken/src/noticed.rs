@@ -1,49 +1,26 @@
 //! The routers' own tests notice the mistakes: each in a process of its own that makes one mistake all the time. In the
 //! copy without a mistake they pass, so a mistake it is that they notice.
 
-use crate::catalog::GROUPS;
+use crate::catalog;
 use crate::catalog::planted::{IN_NETWORKS, Planted};
-use crate::mistakes::MISTAKE_VARIABLE;
+use rohrpost_planted::{Verdict, run};
 use std::collections::BTreeSet;
-use std::process::{Command, Stdio};
 use std::sync::Mutex;
 
-/// Where the random cases of proptest begin: the same in each run, so a mistake that they notice is noticed always.
-const CASES: &str = "1";
-
-/// What came of a copied test.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Verdict {
-    Passed,
-    Failed,
-    /// It is not there, or could not run.
-    Unknown,
-}
-
-/// Runs one of the copied tests, which are ignored otherwise.
-fn run(test: &str, mistake: Option<&str>) -> Verdict {
-    let mut command = Command::new(std::env::current_exe().expect("a test has a file"));
-    command.args(["--exact", test, "--ignored", "--test-threads=1"]).env_remove(MISTAKE_VARIABLE);
-    command.env("PROPTEST_RNG_SEED", CASES);
-    mistake.map(|name| command.env(MISTAKE_VARIABLE, name));
-    let output = command.stdin(Stdio::null()).output().expect("a test can be run");
-    let text = String::from_utf8_lossy(&output.stdout);
-    match text.lines().find_map(|line| line.strip_prefix("test result: ")) {
-        Some(result) if result.starts_with("ok. 1 passed; 0 failed;") => Verdict::Passed,
-        Some(result) if result.starts_with("FAILED. 0 passed; 1 failed;") => Verdict::Failed,
-        _ => Verdict::Unknown,
-    }
+/// What comes of one of the copied tests.
+fn verdict(test: &str, mistake: Option<&str>) -> Verdict {
+    run(&["--exact", test, "--test-threads=1"], mistake).verdict()
 }
 
 fn notices(planted: &Planted) -> Result<(), String> {
-    match run(planted.shows_in, Some(planted.name)) {
+    match verdict(planted.shows_in, Some(planted.name)) {
         Verdict::Failed => Ok(()),
         verdict => Err(format!("{}: {verdict:?} with {}: {}", planted.shows_in, planted.name, planted.text)),
     }
 }
 
 fn passes(test: &str) -> Result<(), String> {
-    match run(test, None) {
+    match verdict(test, None) {
         Verdict::Passed => Ok(()),
         verdict => Err(format!("{test}: {verdict:?} without a mistake")),
     }
@@ -62,7 +39,7 @@ fn wrong<T: Send>(all: impl IntoIterator<Item = T>, check: fn(T) -> Result<(), S
 }
 
 fn planted() -> impl Iterator<Item = &'static Planted> {
-    GROUPS.iter().flat_map(|group| group.mistakes).filter(|planted| planted.shows_in != IN_NETWORKS)
+    catalog::all().filter(|planted| planted.shows_in != IN_NETWORKS)
 }
 
 #[test]

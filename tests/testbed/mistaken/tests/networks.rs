@@ -16,7 +16,7 @@ mod simulated;
 
 use caught::{CAUGHT, Caught, Network, UNSEEN, UNSEEN_GROUPS};
 use guard::guard;
-use rohrpost_mistaken::catalog::GROUPS;
+use rohrpost_mistaken::catalog::{self, GROUPS};
 use rohrpost_mistaken::mistakes::{Mistake, with};
 use sim::promise::Promise;
 use sim::run::run;
@@ -80,8 +80,7 @@ fn every_mistake_names_a_promise_or_is_said_to_break_none() {
     let unseen: BTreeSet<_> =
         unseen.chain(groups.flat_map(|group| group.mistakes).map(|planted| planted.name.into())).collect();
     assert_eq!(caught.intersection(&unseen).collect::<Vec<_>>(), Vec::<&String>::new(), "named and unseen");
-    let all: BTreeSet<String> =
-        GROUPS.iter().flat_map(|group| group.mistakes).map(|planted| planted.name.into()).collect();
+    let all: BTreeSet<String> = catalog::all().map(|planted| planted.name.into()).collect();
     assert_eq!(caught.union(&unseen).cloned().collect::<BTreeSet<_>>(), all);
 }
 

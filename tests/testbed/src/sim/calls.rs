@@ -57,20 +57,20 @@ pub type NewGuard = fn(started_ns: u64) -> Box<dyn Guard>;
 
 /// A call.
 #[derive(Clone, Debug)]
-pub struct Call {
+pub(crate) struct Call {
     /// Which of the plan's callers.
-    pub caller: usize,
+    pub(crate) caller: usize,
     /// Its number.
-    pub sequence: u32,
+    pub(crate) sequence: u32,
     /// When it began, true ns.
-    pub began_true_ns: u64,
+    pub(crate) began_true_ns: u64,
     /// The same on its node's monotonic clock.
     began_ns: u64,
     /// Validity, ns.
-    pub valid_for_ns: u64,
+    pub(crate) valid_for_ns: u64,
     tries: u64,
     /// What the caller was told first.
-    pub outcome: Option<Answer>,
+    pub(crate) outcome: Option<Answer>,
     runs: Vec<u32>,
     /// Server's incarnation that ran it last.
     life: Option<u32>,
@@ -81,42 +81,42 @@ pub struct Call {
 
 /// A command that waits in a server's mailbox.
 #[derive(Clone, Copy, Debug)]
-pub struct QueuedCommand {
+pub(crate) struct QueuedCommand {
     /// Number of the package.
-    pub number: u32,
+    pub(crate) number: u32,
     /// Which call it is a try of.
-    pub call: usize,
+    pub(crate) call: usize,
     /// Its age when it was posted, ns.
-    pub age_ns: u64,
+    pub(crate) age_ns: u64,
     /// When it was posted, true ns.
-    pub posted_ns: u64,
+    pub(crate) posted_ns: u64,
     /// When it came, on the server's monotonic clock.
-    pub published_ns: u64,
+    pub(crate) published_ns: u64,
     /// When it came, true ns.
-    pub published_true_ns: u64,
+    pub(crate) published_true_ns: u64,
     /// Whether it was marked so.
-    pub redelivered: bool,
+    pub(crate) redelivered: bool,
 }
 
 /// A module that runs commands.
-pub struct Server {
+pub(crate) struct Server {
     guard: Box<dyn Guard>,
     new_guard: NewGuard,
     life: u32,
     /// How many faults keep it dead now.
-    pub dead: u32,
+    pub(crate) dead: u32,
     /// Commands in its mailbox.
-    pub waiting: VecDeque<QueuedCommand>,
+    pub(crate) waiting: VecDeque<QueuedCommand>,
 }
 
 impl Server {
     /// One that starts now.
-    pub fn new(new_guard: NewGuard, now: Now) -> Self {
+    pub(crate) fn new(new_guard: NewGuard, now: Now) -> Self {
         Self { guard: new_guard(now.monotonic_ns), new_guard, life: 0, dead: 0, waiting: VecDeque::new() }
     }
 
     /// It starts again.
-    pub fn start(&mut self, now: Now) {
+    pub(crate) fn start(&mut self, now: Now) {
         self.life += 1;
         self.guard = (self.new_guard)(now.monotonic_ns);
     }
@@ -124,15 +124,15 @@ impl Server {
 
 /// All calls.
 #[derive(Default)]
-pub struct Calls {
+pub(crate) struct Calls {
     /// By number.
-    pub all: Vec<Call>,
+    pub(crate) all: Vec<Call>,
     runs: u32,
 }
 
 impl Calls {
     /// A new call; its number. Incarnations and sequences are the caller's.
-    pub fn begin(&mut self, now: Now, caller: usize, sequence: u32, valid_for_ns: u64) -> usize {
+    pub(crate) fn begin(&mut self, now: Now, caller: usize, sequence: u32, valid_for_ns: u64) -> usize {
         self.all.push(Call {
             caller,
             sequence,
@@ -149,7 +149,7 @@ impl Calls {
     }
 
     /// Age of the next try, or none if there is to be none.
-    pub fn next_try(&mut self, now: Now, call: usize) -> Option<u64> {
+    pub(crate) fn next_try(&mut self, now: Now, call: usize) -> Option<u64> {
         let call = &mut self.all[call];
         let since_ns = now.monotonic_ns - call.began_ns;
         if call.outcome.is_some() || call.tries == TRIES || since_ns >= call.valid_for_ns {
@@ -161,13 +161,13 @@ impl Calls {
     }
 
     /// From one try to the next, ns.
-    pub fn repeat_after_ns(&self, call: usize) -> u64 {
+    pub(crate) fn repeat_after_ns(&self, call: usize) -> u64 {
         self.all[call].valid_for_ns / TRIES
     }
 
     /// A server takes the next command from its mailbox: the answer to give, if any, and what was taken. With `dies` it
     /// dies at some step of it, and the command stays.
-    pub fn serve(
+    pub(crate) fn serve(
         &mut self,
         oracle: &mut Oracle,
         server: &mut Server,
@@ -225,7 +225,7 @@ impl Calls {
     }
 
     /// The caller has an answer.
-    pub fn answered(&mut self, oracle: &mut Oracle, now: Now, index: usize, answer: Answer) {
+    pub(crate) fn answered(&mut self, oracle: &mut Oracle, now: Now, index: usize, answer: Answer) {
         let call = &mut self.all[index];
         if call.outcome.is_some() || now.monotonic_ns - call.began_ns >= call.valid_for_ns {
             return;

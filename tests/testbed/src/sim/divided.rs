@@ -7,27 +7,27 @@ use super::transmission::{Basis, Transmission};
 
 /// A fault that divides the network for longer than this may leave it with two times: two masters that do not hear each
 /// other.
-pub const HOLDOVER_NS: u64 = 100 * MS;
+pub(crate) const HOLDOVER_NS: u64 = 100 * MS;
 /// So many cycles after such a fault no two nodes transmit at once any more.
-pub const HEALED_CYCLES: u64 = 16;
+pub(crate) const HEALED_CYCLES: u64 = 16;
 /// So many cycles after the later of two began a time their Syncs meet no more: by then one has heard the other, and
 /// yields.
-pub const BEGINNERS_CYCLES: u64 = 4;
+pub(crate) const BEGINNERS_CYCLES: u64 = 4;
 
 /// A fault because of which nodes do not hear each other, or too late.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Division {
+pub(crate) struct Division {
     /// When it begins, true ns.
-    pub from_ns: u64,
+    pub(crate) from_ns: u64,
     /// When it is over, and what it kept up has come, true ns.
-    pub until_ns: u64,
+    pub(crate) until_ns: u64,
     /// The nodes that it parts.
-    pub parts: Parts,
+    pub(crate) parts: Parts,
 }
 
 /// The nodes that a fault parts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Parts {
+pub(crate) enum Parts {
     /// These two: one does not hear the other, or too late.
     Cut(usize, usize),
     /// The nodes of which the bit is set from all others.
@@ -60,7 +60,7 @@ impl Parts {
 
 /// All faults of a plan that divide its network.
 #[derive(Clone, Default, Debug)]
-pub struct Divisions {
+pub(crate) struct Divisions {
     all: Vec<Division>,
     cycle_ns: u64,
     /// Extra time, ns, that a node needs with rare slots: it must ask a peer that restarted during the division before
@@ -70,7 +70,7 @@ pub struct Divisions {
 
 impl Divisions {
     /// Those of such faults, where cycles are so long.
-    pub fn of(faults: &[Planned], cycle_ns: u64) -> Self {
+    pub(crate) fn of(faults: &[Planned], cycle_ns: u64) -> Self {
         let all = faults.iter().filter_map(|planned| {
             let parts = Parts::of(&planned.fault)?;
             // What it has kept up still comes, and nothing comes before it.
@@ -88,7 +88,7 @@ impl Divisions {
     /// - not have been over for [`HEALED_CYCLES`], or longer where slots are rare.
     ///
     /// Of two that begin a time neither can know of the other before it has heard it, for [`BEGINNERS_CYCLES`] at most.
-    pub fn excuse(&self, one: &Transmission, other: &Transmission, began_ns: u64) -> bool {
+    pub(crate) fn excuse(&self, one: &Transmission, other: &Transmission, began_ns: u64) -> bool {
         let at_ns = one.begin_ns;
         if let (Basis::Begins { since_ns }, Basis::Begins { since_ns: other_ns }) = (one.basis, other.basis)
             && at_ns <= since_ns.max(other_ns) + BEGINNERS_CYCLES * self.cycle_ns

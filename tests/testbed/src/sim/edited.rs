@@ -20,21 +20,16 @@ const LISTENS_NS: u64 = 10 * S;
 enum Edit {
     /// Nothing of the slots.
     Else,
-    /// The cycle is longer.
     Cycle,
     /// Windows of synchronisation are longer, and slots begin later.
     Synchronisation,
-    /// The guard is shorter.
     Guard,
-    /// All slots begin later.
     Offset,
-    /// A slot is shorter.
     Length,
     /// A slot comes in every other cycle.
     Period,
     /// Two slots have changed hands.
     Owners,
-    /// A slot is gone.
     Fewer,
     /// Masters stand in another order.
     Masters,
@@ -45,7 +40,6 @@ enum Edit {
 }
 
 impl Edit {
-    /// All.
     const ALL: [Self; 12] = [
         Self::Else,
         Self::Cycle,

@@ -6,36 +6,33 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// Slots of the transit mailbox, as the shell makes it.
-pub const TRANSIT_SLOTS: usize = 64;
+pub(crate) const TRANSIT_SLOTS: usize = 64;
 /// Older packages are dropped when the router takes from it, ns.
-pub const TRANSIT_AGE_MAX_NS: u64 = 2_000_000_000;
+pub(crate) const TRANSIT_AGE_MAX_NS: u64 = 2_000_000_000;
 /// Mailboxes for data that a module has.
 pub(super) const DATA_MAILBOXES: u8 = 4;
 /// Commands that wait for a module at most.
-pub const COMMAND_SLOTS: usize = 16;
+pub(crate) const COMMAND_SLOTS: usize = 16;
 
 /// A package between a module and its router.
 #[derive(Clone, Debug)]
-pub struct Parcel {
-    /// Its number in the books.
-    pub number: u32,
-    /// Its head.
-    pub head: Head,
-    /// Its body.
-    pub body: Rc<[u8]>,
+pub(crate) struct Parcel {
+    pub(crate) number: u32,
+    pub(crate) head: Head,
+    pub(crate) body: Rc<[u8]>,
     /// When it was published, on the node's monotonic clock.
-    pub published_ns: u64,
+    pub(crate) published_ns: u64,
 }
 
 /// The router's mailbox: full, the newest of the least important gives way.
 #[derive(Debug, Default)]
-pub struct Transit {
+pub(crate) struct Transit {
     waiting: Vec<Parcel>,
 }
 
 impl Transit {
     /// Puts a package in; returns the one that has no room.
-    pub fn post(&mut self, parcel: Parcel) -> Option<Parcel> {
+    pub(crate) fn post(&mut self, parcel: Parcel) -> Option<Parcel> {
         if self.waiting.len() < TRANSIT_SLOTS {
             self.waiting.push(parcel);
             return None;
@@ -52,17 +49,16 @@ impl Transit {
     }
 
     /// The most urgent; of those, the first.
-    pub fn take(&mut self) -> Option<Parcel> {
+    pub(crate) fn take(&mut self) -> Option<Parcel> {
         self.first_at().map(|at| self.waiting.remove(at))
     }
 
     /// How many packages wait, and how important the first is.
-    pub fn waits(&self) -> (usize, Option<Priority>) {
+    pub(crate) fn waits(&self) -> (usize, Option<Priority>) {
         (self.waiting.len(), self.waiting.iter().map(|parcel| parcel.head.priority).max_by_key(|priority| priority.0))
     }
 
-    /// The one that is taken next.
-    pub fn first(&self) -> Option<&Parcel> {
+    pub(crate) fn first(&self) -> Option<&Parcel> {
         self.first_at().map(|at| &self.waiting[at])
     }
 
@@ -72,31 +68,30 @@ impl Transit {
     }
 
     /// The router died with this one in its hand: it comes again, once.
-    pub fn put_back(&mut self, mut parcel: Parcel) {
+    pub(crate) fn put_back(&mut self, mut parcel: Parcel) {
         parcel.head.options = parcel.head.options.with(Options::REDELIVERED);
         self.waiting.insert(0, parcel);
     }
 
-    /// Whether nothing waits.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.waiting.is_empty()
     }
 }
 
 /// A mailbox's state.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Mailbox {
+pub(crate) struct Mailbox {
     /// How many faults take it away now.
-    pub absent: u32,
+    pub(crate) absent: u32,
     /// How many faults fill it now.
-    pub full: u32,
+    pub(crate) full: u32,
     /// Packages in it; its reader may be slow.
-    pub waiting: usize,
+    pub(crate) waiting: usize,
 }
 
 /// Why a mailbox does not take a package.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Closed {
+pub(crate) enum Closed {
     /// There is none of that name.
     Absent,
     /// There is no room.
@@ -105,17 +100,17 @@ pub enum Closed {
 
 /// A computer but for its router.
 #[derive(Debug, Default)]
-pub struct Host {
+pub(crate) struct Host {
     /// The router's mailbox.
-    pub transit: Transit,
+    pub(crate) transit: Transit,
     /// Those of the modules.
-    pub boxes: BTreeMap<Name, Mailbox>,
+    pub(crate) boxes: BTreeMap<Name, Mailbox>,
     /// How many faults keep its socket from taking every other datagram.
-    pub unsendable: u32,
+    pub(crate) unsendable: u32,
     /// What was put in them, in order, until the world looks: number of the package.
-    pub arrived: Vec<u32>,
+    pub(crate) arrived: Vec<u32>,
     /// Commands that came back from the node's own router, as errors.
-    pub returned: Vec<u32>,
+    pub(crate) returned: Vec<u32>,
 }
 
 impl Host {
@@ -123,7 +118,7 @@ impl Host {
     ///
     /// # Errors
     /// [`Closed`]
-    pub fn deliver(&mut self, to: Name, number: u32) -> Result<(), Closed> {
+    pub(crate) fn deliver(&mut self, to: Name, number: u32) -> Result<(), Closed> {
         let Some(mailbox) = self.boxes.get_mut(&to).filter(|mailbox| mailbox.absent == 0) else {
             return Err(Closed::Absent);
         };

@@ -24,7 +24,7 @@ pub struct Quality {
 
 impl Quality {
     /// What comes out at all has been on its way for so long at most, ns.
-    pub fn way_ns_max(&self) -> u64 {
+    pub(crate) fn way_ns_max(&self) -> u64 {
         let way_ns = self.delay_ns + self.jitter_ns;
         let reordered_ns = if self.reorder_ppm > 0 { (11 * way_ns).min(WIRE_NS_MAX / 2) } else { 0 };
         way_ns.max(reordered_ns) + if self.rate_bytes_s > 0 { WAIT_NS_MAX } else { 0 }
@@ -36,32 +36,32 @@ const WAIT_NS_MAX: u64 = WIRE_NS_MAX / 2;
 
 /// What becomes of a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Passage {
+pub(crate) struct Passage {
     /// When it comes out, true ns.
-    pub at_ns: u64,
+    pub(crate) at_ns: u64,
     /// Whether bits of it were flipped on the way.
-    pub damaged: bool,
+    pub(crate) damaged: bool,
 }
 
 /// A direction with its present state.
 #[derive(Clone, Debug)]
-pub struct Link {
+pub(crate) struct Link {
     /// How it is now.
-    pub quality: Quality,
+    pub(crate) quality: Quality,
     /// How many faults cut it now.
-    pub cuts: u32,
+    pub(crate) cuts: u32,
     free_at_ns: u64,
     last_at_ns: u64,
 }
 
 impl Link {
     /// A link that is whole.
-    pub fn new(quality: Quality) -> Self {
+    pub(crate) fn new(quality: Quality) -> Self {
         Self { quality, cuts: 0, free_at_ns: 0, last_at_ns: 0 }
     }
 
     /// Where a datagram comes out: never, once, or twice.
-    pub fn pass(&mut self, now_ns: u64, bytes: usize, chance: &mut Chance) -> [Option<Passage>; 2] {
+    pub(crate) fn pass(&mut self, now_ns: u64, bytes: usize, chance: &mut Chance) -> [Option<Passage>; 2] {
         let quality = self.quality;
         if self.cuts > 0 || chance.per_million(quality.loss_ppm) {
             return [None, None];

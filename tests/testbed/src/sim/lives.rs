@@ -8,20 +8,19 @@ use std::collections::{BTreeSet, VecDeque};
 
 /// Packages that one incarnation of a router has to account for.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
-pub struct Account {
+pub(crate) struct Account {
     /// Taken from its computer.
-    pub accepted: u64,
+    pub(crate) accepted: u64,
     /// Sent whole.
-    pub left: u64,
+    pub(crate) left: u64,
     /// Counted with a cause.
-    pub lost: u64,
+    pub(crate) lost: u64,
 }
 
 /// What one incarnation of a router sends.
 #[derive(Default, Debug)]
-pub struct Sending {
-    /// Its packages.
-    pub account: Account,
+pub(crate) struct Sending {
+    pub(crate) account: Account,
     /// Datagrams in which the most urgent package is of a lower level than this.
     pub(super) below: [u64; LEVELS],
     /// Packages of each module that wait.
@@ -45,7 +44,7 @@ pub(super) struct WaitingPackages {
 
 /// What one incarnation of a router takes.
 #[derive(Default, Debug)]
-pub struct Receiving {
+pub(crate) struct Receiving {
     /// Packages of which something came.
     pub(super) receipts: Table<u32, Receipt>,
     /// Datagrams, by the sender's incarnation.

@@ -15,7 +15,6 @@ const CALL_BYTES: (u64, u64) = (8, 200);
 const ANSWERED_WITHIN_NS: u64 = 500 * MS;
 
 impl World<'_> {
-    /// The next packages of a flow.
     pub(super) fn flow(&mut self, index: usize) {
         let flow = self.plan.flows[index];
         let end_ns = if flow.burst > 1 { self.plan.fixed_ns } else { self.plan.traffic_end_ns };

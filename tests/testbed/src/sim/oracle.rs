@@ -20,11 +20,9 @@ use rohrpost_routers::time::Term;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// The books.
 #[derive(Default)]
-pub struct Oracle {
-    /// All packages, by number.
-    pub packages: Vec<Package>,
+pub(crate) struct Oracle {
+    pub(crate) packages: Vec<Package>,
     places: Table<(Name, Name, u8), u32>,
     ids: Table<(Name, Name, i16), u16>,
     /// Packages by what their heads tell them apart by.
@@ -38,57 +36,57 @@ pub struct Oracle {
     /// When a router last took something of another, true ns, and the incarnations of both: receiver, sender.
     pub(super) heard: Table<(usize, usize), (u64, u32, u32)>,
     /// From posting to delivery at most, ns, by sender, mailbox and priority.
-    pub slowest_ns: BTreeMap<(Name, Name, u8), u64>,
-    /// The records of all streams.
-    pub records: RecordBooks,
+    pub(crate) slowest_ns: BTreeMap<(Name, Name, u8), u64>,
+    pub(crate) records: RecordBooks,
     /// From writing to reading of a replica at most, ns.
-    pub slowest_record_ns: u64,
-    /// What was broken.
-    pub problems: Vec<Problem>,
+    pub(crate) slowest_record_ns: u64,
+    pub(crate) problems: Vec<Problem>,
     /// What was seen, so that a test knows that it saw enough.
-    pub seen: BTreeMap<&'static str, u64>,
+    pub(crate) seen: BTreeMap<&'static str, u64>,
     /// Bodies are cut from it.
     pattern: Vec<u8>,
     /// Level of a priority.
     bulk_below: u8,
-    /// Whether datagrams are sealed.
-    pub is_sealed: bool,
+    pub(crate) is_sealed: bool,
     /// From then on all must be well, true ns.
-    pub well_ns: u64,
-    /// System time.
-    pub times: Times,
+    pub(crate) well_ns: u64,
+    pub(crate) times: Times,
     /// Which node transmits when, with time slots.
-    pub wire: Wire,
+    pub(crate) wire: Wire,
     /// The master, and its term, that all nodes must agree on by now.
-    pub master: Option<(Option<NodeIndex>, Term)>,
+    pub(crate) master: Option<(Option<NodeIndex>, Term)>,
 }
 
 const PATTERN_PRIME: usize = 251;
 
 impl Oracle {
-    /// Empty books.
-    pub fn new(bulk_below: u8) -> Self {
+    pub(crate) fn new(bulk_below: u8) -> Self {
         let pattern = (0..u16::MAX as usize + PATTERN_PRIME).map(|n| (n % PATTERN_PRIME) as u8).collect();
         Self { pattern, bulk_below, ..Self::default() }
     }
 
-    /// Notes that a promise was broken.
-    pub fn broken(&mut self, now: Now, promise: Promise, text: String) {
+    pub(crate) fn broken(&mut self, now: Now, promise: Promise, text: String) {
         self.problems.push(Problem { promise, at_ns: now.true_ns, text });
     }
 
     /// Counts something that was seen.
-    pub fn saw(&mut self, what: &'static str) {
+    pub(crate) fn saw(&mut self, what: &'static str) {
         *self.seen.entry(what).or_default() += 1;
     }
 
     /// Level of a package, 0 goes first.
-    pub fn level(&self, priority: u8) -> usize {
+    pub(crate) fn level(&self, priority: u8) -> usize {
         if priority < self.bulk_below { LEVELS - 1 } else { (15 - usize::from(priority >> 4)) * 2 }
     }
 
     /// A new package, from a node to a node: its number, its head with an id of its own, its body.
-    pub fn post(&mut self, now: Now, mut head: Head, nodes: (usize, usize), role: Role) -> (u32, Head, Rc<[u8]>) {
+    pub(crate) fn post(
+        &mut self,
+        now: Now,
+        mut head: Head,
+        nodes: (usize, usize),
+        role: Role,
+    ) -> (u32, Head, Rc<[u8]>) {
         let number = self.packages.len() as u32;
         let id = self.ids.entry((head.from, head.to, head.kind.0)).or_default();
         *id = id.wrapping_add(1);
@@ -124,7 +122,7 @@ impl Oracle {
     }
 
     /// The number of the package with this head.
-    pub fn number(&self, head: &Head) -> Option<u32> {
+    pub(crate) fn number(&self, head: &Head) -> Option<u32> {
         self.by_head.get(&key(head)).copied()
     }
 
@@ -140,7 +138,7 @@ fn key(head: &Head) -> (Name, Name, i16, u16) {
 }
 
 /// The number in a body of ours.
-pub fn number_of(body: &[u8]) -> Option<u32> {
+pub(crate) fn number_of(body: &[u8]) -> Option<u32> {
     let number = u32::from_le_bytes(*body.first_chunk()?);
     let check = u32::from_le_bytes(*body.get(4..)?.first_chunk()?);
     (check == !number).then_some(number)

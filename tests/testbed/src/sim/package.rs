@@ -5,38 +5,31 @@ use rohrpost_routers::frame::NodeIndex;
 
 /// What a caller is told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Answer {
+pub(crate) enum Answer {
     /// It was run, as this run of all.
     Ran(u32),
     /// It may have been run.
     Interrupted,
-    /// It was not run.
     NotRun,
 }
 
 /// What a package is for.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Role {
-    /// Data of a flow.
+pub(crate) enum Role {
     Data,
     /// A try of a call, so many ns after the first.
     Command {
-        /// Which call.
         call: usize,
         /// Its age when it was posted, ns on the caller's clock.
         age_ns: u64,
     },
-    /// An answer to a call.
     Answer {
-        /// Which call.
         call: usize,
-        /// What it says.
         answer: Answer,
     },
     /// A router's answer to a command that it could not deliver. It has no place among those of the module for which it
     /// speaks.
     Report {
-        /// Which call.
         call: usize,
     },
     /// What nobody needs, from a hostile program: it writes what it likes in its heads, and its router caps no
@@ -46,7 +39,7 @@ pub enum Role {
 
 /// How far a package has come at its sender's side.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum SendStage {
+pub(crate) enum SendStage {
     /// It waits for the router, or was lost there: by the mailbox, which counts it.
     Transit,
     /// Its router has it.
@@ -57,25 +50,23 @@ pub enum SendStage {
     Left,
 }
 
-/// A package.
 #[derive(Clone, Debug)]
-pub struct Package {
+pub(crate) struct Package {
     /// Its head when it was posted.
-    pub head: Head,
+    pub(crate) head: Head,
     /// Where its modules are.
-    pub from_node: NodeIndex,
+    pub(crate) from_node: NodeIndex,
     /// The node that it is for.
-    pub to_node: NodeIndex,
-    /// What it is for.
-    pub role: Role,
+    pub(crate) to_node: NodeIndex,
+    pub(crate) role: Role,
     /// When it was posted, true ns.
-    pub posted_ns: u64,
+    pub(crate) posted_ns: u64,
     /// Its place among those of its sender, receiver and priority.
     pub(super) place: u32,
     /// How far it has come.
-    pub way: SendStage,
+    pub(crate) way: SendStage,
     /// Life of the router that accepted it.
-    pub life: u32,
+    pub(crate) life: u32,
     /// When it was published, on its node's monotonic clock.
     pub(super) published_ns: u64,
     /// Its place among all that its router accepted.
@@ -85,9 +76,9 @@ pub struct Package {
     /// It was for a node that its router did not know yet, so that others may go before it.
     pub(super) held: bool,
     /// Whether it came marked as one that was handed out before.
-    pub redelivered: bool,
+    pub(crate) redelivered: bool,
     /// At each delivery, incarnation of the router that sent it and incarnation of the one that delivered.
-    pub deliveries: Vec<(u64, u32)>,
+    pub(crate) deliveries: Vec<(u64, u32)>,
 }
 
 /// As a package may be delivered at most.

@@ -20,7 +20,7 @@ impl Oracle {
     /// A router took a datagram: each whole package in it has a fate by now, and so has a large one of which this was
     /// the last part that was missing. `first`: where datagrams are sealed, the sequence from which on its incarnation
     /// is heard.
-    pub fn took(&mut self, now: Now, life: u32, (datagram, first): (&[u8], Option<u64>), digest: u64) {
+    pub(crate) fn took(&mut self, now: Now, life: u32, (datagram, first): (&[u8], Option<u64>), digest: u64) {
         let Ok((head, frame)) = Frame::parse(datagram) else {
             return self.broken(now, Promise::Unchanged, "a datagram that is no frame was taken".into());
         };
@@ -62,7 +62,7 @@ impl Oracle {
     }
 
     /// Whether a datagram has whole packages, and a router took none that was sent behind it.
-    pub fn is_newest(&self, life: u32, datagram: &[u8]) -> bool {
+    pub(crate) fn is_newest(&self, life: u32, datagram: &[u8]) -> bool {
         let Ok((head, _)) = FrameHead::read(datagram) else { return false };
         let taken = self.receiving.get(&life).and_then(|receiving| receiving.taken.get(&head.incarnation));
         head.kind == FrameKind::Packages && taken.is_none_or(|taken| head.sequence > taken.highest)
@@ -70,7 +70,7 @@ impl Oracle {
 
     /// Whether a router took a datagram before, or cannot tell: it is out of the window, or from before the sequence
     /// from which on its incarnation is heard; that is `first`, or where it came back.
-    pub fn came(&self, life: u32, head: &FrameHead, first: u64) -> bool {
+    pub(crate) fn came(&self, life: u32, head: &FrameHead, first: u64) -> bool {
         let receiving = self.receiving.get(&life);
         let Some(taken) = receiving.and_then(|receiving| receiving.taken.get(&head.incarnation)) else {
             return head.sequence < first;
@@ -83,7 +83,7 @@ impl Oracle {
     /// - what goes on of an incarnation before, only while its successor `is_silent`;
     /// - a new incarnation, and what is out of the window, only when a second datagram within [`CONFIRMED_WITHIN_NS`]
     ///   is near. It remembers a few that waited for a second.
-    pub fn may_be_old(&mut self, now: Now, life: u32, head: &FrameHead, is_silent: bool) -> bool {
+    pub(crate) fn may_be_old(&mut self, now: Now, life: u32, head: &FrameHead, is_silent: bool) -> bool {
         let receiving = self.receiving.entry(life).or_default();
         let present = receiving.present.get(&head.from).copied();
         match receiving.taken.get(&head.incarnation) {
@@ -121,7 +121,7 @@ impl Oracle {
     }
 
     /// A router counts a package that came, or parts of it; its number.
-    pub fn lost_behind(&mut self, now: Now, life: u32, head: &Head) -> Option<u32> {
+    pub(crate) fn lost_behind(&mut self, now: Now, life: u32, head: &Head) -> Option<u32> {
         let number = self.number(head);
         match number {
             Some(number) => self.receipt(life, number).ended = true,
@@ -131,7 +131,7 @@ impl Oracle {
     }
 
     /// A router hands a package to a mailbox. Its number, if it is one that was sent there, and unchanged.
-    pub fn arrives(&mut self, now: Now, node: usize, head: &Head, body: &[u8]) -> Option<u32> {
+    pub(crate) fn arrives(&mut self, now: Now, node: usize, head: &Head, body: &[u8]) -> Option<u32> {
         let known = super::oracle::number_of(body).filter(|number| {
             self.packages.get(*number as usize).is_some_and(|package| {
                 let same = Head { options: package.head.options, priority: package.head.priority, ..*head };
@@ -165,7 +165,7 @@ impl Oracle {
 
     /// A mailbox took it. `lives`: incarnation of the router that sent the datagram, not of the one that has the
     /// package by now (it may have found it again when it began), and incarnation of the one that delivers.
-    pub fn delivered(&mut self, now: Now, lives: (u64, u32), number: u32, redelivered: bool) {
+    pub(crate) fn delivered(&mut self, now: Now, lives: (u64, u32), number: u32, redelivered: bool) {
         let (_, life) = lives;
         self.receipt(life, number).ended = true;
         let package = &mut self.packages[number as usize];
@@ -195,7 +195,7 @@ impl Oracle {
 
     /// How many datagrams of a peer never came, as an incarnation of a router should have counted by now; none if that
     /// is not clear.
-    pub fn missing(&self, life: u32, from: NodeIndex) -> Option<u64> {
+    pub(crate) fn missing(&self, life: u32, from: NodeIndex) -> Option<u64> {
         let lives = || self.receiving.get(&life).into_iter().flat_map(|its| its.taken.values());
         let lives = || lives().filter(|taken| taken.from == from);
         let missing = |taken: &Taken| {
@@ -206,7 +206,7 @@ impl Oracle {
     }
 
     /// At the end: of no package has a router only parts, uncounted.
-    pub fn close_receipts(&mut self, now: Now, life: u32) {
+    pub(crate) fn close_receipts(&mut self, now: Now, life: u32) {
         let Some(receiving) = self.receiving.get(&life) else { return };
         let open = receiving.receipts.iter().filter(|(_, receipt)| !receipt.ended);
         let mut open: Vec<u32> = open.map(|(number, _)| *number).collect();

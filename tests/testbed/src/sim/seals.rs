@@ -82,7 +82,6 @@ pub(super) fn altered(datagram: &[u8], chance: &mut Chance) -> Rc<[u8]> {
     Rc::from(bytes)
 }
 
-/// Flips some bits.
 pub(super) fn damage(bytes: &[u8], chance: &mut Chance) -> Rc<[u8]> {
     let mut bytes = bytes.to_vec();
     for _ in 0..chance.between(1, 4) {

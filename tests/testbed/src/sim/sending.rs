@@ -19,7 +19,7 @@ const AHEAD_NS_MAX: u64 = MS + 1000;
 
 impl Oracle {
     /// A router is given a package.
-    pub fn accepted(&mut self, life: u32, number: u32, published_ns: u64) {
+    pub(crate) fn accepted(&mut self, life: u32, number: u32, published_ns: u64) {
         let level = self.level(self.packages[number as usize].head.priority.0);
         let sending = self.sending.entry(life).or_default();
         sending.account.accepted += 1;
@@ -33,12 +33,12 @@ impl Oracle {
     }
 
     /// A router has accepted a package for a node that it does not know yet.
-    pub fn held(&mut self, number: u32) {
+    pub(crate) fn held(&mut self, number: u32) {
         self.packages[number as usize].held = true;
     }
 
     /// A router has done with a package what it does at once: no sender has more waiting than its quota.
-    pub fn queued(&mut self, now: Now, life: u32, number: u32, quota_bytes: usize) {
+    pub(crate) fn queued(&mut self, now: Now, life: u32, number: u32, quota_bytes: usize) {
         let module = self.packages[number as usize].head.from.module();
         let Some(waiting) = self.sending.get(&life).and_then(|sending| sending.waiting.get(&module)) else { return };
         if waiting.bytes > quota_bytes {
@@ -48,17 +48,17 @@ impl Oracle {
     }
 
     /// Bytes of all packages that wait in a router.
-    pub fn waiting_bytes(&self, life: u32) -> usize {
+    pub(crate) fn waiting_bytes(&self, life: u32) -> usize {
         self.sending.get(&life).map_or(0, |sending| sending.waiting.values().map(|waiting| waiting.bytes).sum())
     }
 
     /// What an incarnation of a router has to account for.
-    pub fn account(&self, life: u32) -> Account {
+    pub(crate) fn account(&self, life: u32) -> Account {
         self.sending.get(&life).map(|sending| sending.account).unwrap_or_default()
     }
 
     /// A router counts a package that it will not send; its number.
-    pub fn lost_before(&mut self, now: Now, life: u32, head: &Head, cause: Cause) -> Option<u32> {
+    pub(crate) fn lost_before(&mut self, now: Now, life: u32, head: &Head, cause: Cause) -> Option<u32> {
         let number = self.number(head)?;
         if !self.is_waiting(now, life, number, "is counted as lost") {
             return None;
@@ -101,7 +101,7 @@ impl Oracle {
     }
 
     /// A datagram leaves a router: all that is in it was waiting, and may go now.
-    pub fn leaves(&mut self, now: Now, life: u32, datagram: &[u8]) {
+    pub(crate) fn leaves(&mut self, now: Now, life: u32, datagram: &[u8]) {
         let mut first = LEVELS;
         match Frame::parse(datagram) {
             Ok((_, Frame::Packages(packages))) => {
@@ -152,7 +152,7 @@ impl Oracle {
 
     /// In time slots nothing leaves while something more important waits, whichever node it is for and however large:
     /// of those that something can be sealed to. `behind`: the first that waits in the mailbox.
-    pub fn is_strict(
+    pub(crate) fn is_strict(
         &mut self,
         now: Now,
         life: u32,
@@ -175,7 +175,7 @@ impl Oracle {
     }
 
     /// Without time slots no router sends faster than it may; "still there" goes anyway.
-    pub fn paces(&mut self, now: Now, life: u32, datagram: &[u8], shape: &Shape, overhead_bytes: usize) {
+    pub(crate) fn paces(&mut self, now: Now, life: u32, datagram: &[u8], shape: &Shape, overhead_bytes: usize) {
         let first = self.levels(datagram).map(|(first, _)| first);
         let sending = self.sending.entry(life).or_default();
         let ahead_ns = sending.through_ns.saturating_sub(now.monotonic_ns);
@@ -196,7 +196,7 @@ impl Oracle {
 
     /// Without time slots a part of a replica leaves only at the rate that packages leave to it; "still there" goes
     /// anyway.
-    pub fn paces_parts(&mut self, now: Now, life: u32, (bytes, is_alive): (usize, bool), shape: &Shape) {
+    pub(crate) fn paces_parts(&mut self, now: Now, life: u32, (bytes, is_alive): (usize, bool), shape: &Shape) {
         let sending = self.sending.entry(life).or_default();
         let ahead_ns = sending.all_through_ns.saturating_sub(now.monotonic_ns);
         let takes_ns = |bytes: usize| bytes as u64 * 1_000_000_000 / shape.rate_bytes_s;
@@ -208,7 +208,6 @@ impl Oracle {
         }
     }
 
-    /// The first of a package leaves.
     fn begins(&mut self, now: Now, life: u32, number: u32, head: &Head) {
         let Some(package) = self.packages.get(number as usize) else { return };
         let level = self.level(package.head.priority.0);
@@ -227,7 +226,7 @@ impl Oracle {
 
     /// A datagram that left the queue and no router is lost: what was complete in it waits as before, for as long as it
     /// takes to lose it.
-    pub fn comes_back(&mut self, life: u32, datagram: &[u8]) {
+    pub(crate) fn comes_back(&mut self, life: u32, datagram: &[u8]) {
         let number = |body: &[u8]| super::oracle::number_of(body);
         match Frame::parse(datagram) {
             Ok((_, Frame::Packages(packages))) => {

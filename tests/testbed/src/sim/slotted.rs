@@ -24,7 +24,7 @@ use std::net::IpAddr;
 use std::sync::Arc;
 
 /// One incarnation of a router's timing thread.
-pub struct Slotted {
+pub(crate) struct Slotted {
     packages: Packages,
     time: Ticking,
     driver: SlotDriver,
@@ -259,7 +259,7 @@ impl Ground<'_, '_> {
 
 impl Slotted {
     /// An incarnation that begins now, of these two.
-    pub fn new(
+    pub(crate) fn new(
         (packages, time, replicas): (Packages, Ticking, Option<Replicas>),
         settings: &Settings,
         table: SlotTable,

@@ -16,42 +16,34 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::rc::Rc;
 
 /// A socket of a router, by its place behind the configured port.
-pub type Port = usize;
+pub(crate) type Port = usize;
 /// An address that no node has.
-pub const STRANGER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 255, 254));
+pub(crate) const STRANGER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 255, 254));
 /// Sockets of a router.
-pub const PORTS: usize = 3;
+pub(crate) const PORTS: usize = 3;
 /// A thread that is busy works for less at a time.
 const STILL_NS: u64 = 2 * super::spans::MS;
 /// Bytes that a socket holds for a router that does not read.
-pub const SOCKET_BYTES_MAX: usize = 256 * 1024;
+pub(crate) const SOCKET_BYTES_MAX: usize = 256 * 1024;
 
 /// What a layer may do and see while it runs.
-pub struct Io<'a> {
-    /// Its clocks.
-    pub now: Now,
+pub(crate) struct Io<'a> {
+    pub(crate) now: Now,
     /// Which says what they show later.
-    pub clock: &'a Clock,
+    pub(crate) clock: &'a Clock,
     /// When it began what it does, true ns.
-    pub began_ns: u64,
-    /// The node's index.
-    pub node: usize,
-    /// What was planned.
-    pub plan: &'a Plan,
+    pub(crate) began_ns: u64,
+    pub(crate) node: usize,
+    pub(crate) plan: &'a Plan,
     /// Counts the router's lives, over all nodes.
-    pub life: u32,
+    pub(crate) life: u32,
     /// The incarnation of each node's router; 0: none.
-    pub lives: &'a [u32],
-    /// Its computer.
-    pub host: &'a mut Host,
-    /// The books.
-    pub oracle: &'a mut Oracle,
-    /// Chance.
-    pub chance: &'a mut Chance,
-    /// Datagrams that leave.
-    pub sent: &'a mut Vec<Sent>,
-    /// What is written down.
-    pub trace: &'a mut Trace,
+    pub(crate) lives: &'a [u32],
+    pub(crate) host: &'a mut Host,
+    pub(crate) oracle: &'a mut Oracle,
+    pub(crate) chance: &'a mut Chance,
+    pub(crate) sent: &'a mut Vec<Sent>,
+    pub(crate) trace: &'a mut Trace,
 }
 
 impl Io<'_> {
@@ -61,41 +53,37 @@ impl Io<'_> {
     }
 
     /// The thread was busy for so long: what it does next is later.
-    pub fn works(&mut self, for_ns: u64) {
+    pub(crate) fn works(&mut self, for_ns: u64) {
         if for_ns > 0 {
             self.now = self.clock.at(self.now.true_ns + for_ns);
         }
     }
 
     /// Whether it stood still meanwhile: what it does after that happens only if its router lives so long.
-    pub fn stood_still(&self) -> bool {
+    pub(crate) fn stood_still(&self) -> bool {
         self.now.true_ns > self.began_ns + STILL_NS
     }
 
-    /// Writes a line.
-    pub fn line(&mut self, text: impl FnOnce() -> String) {
+    pub(crate) fn line(&mut self, text: impl FnOnce() -> String) {
         let (node, life) = (self.node, self.life);
         self.trace.line(self.now.true_ns, || format!("{node}/{life} {}", text()));
     }
 }
 
 /// A datagram on its way out.
-pub struct Sent {
-    /// Socket of the receiver.
-    pub port: Port,
-    /// Node that it is for.
-    pub to: usize,
-    /// Its bytes.
-    pub bytes: Rc<[u8]>,
+pub(crate) struct Sent {
+    pub(crate) port: Port,
+    pub(crate) to: usize,
+    pub(crate) bytes: Rc<[u8]>,
     /// When it was handed over; [`Now::default`] for what leaves at once.
-    pub handed: Now,
+    pub(crate) handed: Now,
     /// Incarnation of the receiver that it is sealed to, where it is sealed to one.
-    pub sealed_to: Option<u64>,
+    pub(crate) sealed_to: Option<u64>,
 }
 
 /// Where a datagram that comes in is from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Origin {
+pub(crate) enum Origin {
     /// A router sent it to this node, and it is as it was; the wire may have doubled it, or somebody repeated it.
     Sent {
         /// See [`Sent::sealed_to`].
@@ -109,22 +97,20 @@ pub enum Origin {
 
 /// A datagram that came in.
 #[derive(Clone, Debug)]
-pub struct Arrived {
+pub(crate) struct Arrived {
     /// Socket that has it.
-    pub port: Port,
+    pub(crate) port: Port,
     /// Node that has the address it comes from; none: an address that no node has.
-    pub source: Option<usize>,
-    /// Its bytes.
-    pub bytes: Rc<[u8]>,
+    pub(crate) source: Option<usize>,
+    pub(crate) bytes: Rc<[u8]>,
     /// When the kernel had it.
-    pub stamp: Now,
+    pub(crate) stamp: Now,
     /// Where it is from.
-    pub origin: Origin,
+    pub(crate) origin: Origin,
 }
 
 /// A protocol of a router.
-pub trait Layer {
-    /// A datagram came in.
+pub(crate) trait Layer {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived);
     /// The kernel says when a datagram left a socket: which one, counted from 0, and on which clocks.
     fn left(&mut self, io: &mut Io<'_>, port: Port, index: u64, stamp: Now);
@@ -139,56 +125,52 @@ pub trait Layer {
 }
 
 /// A router that lives.
-pub struct Router {
+pub(crate) struct Router {
     /// Which incarnation this is, over all nodes.
-    pub life: u32,
+    pub(crate) life: u32,
     /// Its protocols: one for each socket, or one for all.
-    pub layers: Vec<Box<dyn Layer>>,
+    pub(crate) layers: Vec<Box<dyn Layer>>,
     /// Datagrams that left each socket.
-    pub sent: [u64; PORTS],
+    pub(crate) sent: [u64; PORTS],
 }
 
 impl Router {
-    /// The protocol that has a socket.
-    pub fn layer(&mut self, port: Port) -> Option<&mut Box<dyn Layer>> {
+    pub(crate) fn layer(&mut self, port: Port) -> Option<&mut Box<dyn Layer>> {
         let last = self.layers.len().saturating_sub(1);
         self.layers.get_mut(port.min(last))
     }
 }
 
-/// A computer.
-pub struct Station {
-    /// Its clocks.
-    pub clock: Clock,
-    /// Mailboxes.
-    pub host: Host,
+pub(crate) struct Station {
+    pub(crate) clock: Clock,
+    pub(crate) host: Host,
     /// Its router, while it lives.
-    pub router: Option<Router>,
+    pub(crate) router: Option<Router>,
     /// How much its clocks run faster than planned now, ns a second.
-    pub drift_ppb: i64,
+    pub(crate) drift_ppb: i64,
     /// How many faults keep its router dead.
-    pub down: u32,
+    pub(crate) down: u32,
     /// How many faults keep its router from running.
-    pub frozen: u32,
+    pub(crate) frozen: u32,
     /// How many faults keep its modules from running.
-    pub asleep: u32,
+    pub(crate) asleep: u32,
     /// How many faults have it sleep.
-    pub sleeps: u32,
+    pub(crate) sleeps: u32,
     /// Which edition of the configuration its router is started from.
-    pub edition: usize,
+    pub(crate) edition: usize,
     /// So much later comes again what it is told of the time; none: nobody repeats it.
-    pub echo_ns: Option<u64>,
+    pub(crate) echo_ns: Option<u64>,
     /// When its timing thread last went to sleep to wake too late, true ns.
-    pub late_at_ns: u64,
+    pub(crate) late_at_ns: u64,
     /// What came in while the router did not run, by port.
-    pub sockets: [VecDeque<Arrived>; PORTS],
+    pub(crate) sockets: [VecDeque<Arrived>; PORTS],
     /// When it is to be woken, true ns; none: not.
-    pub wake_ns: Option<u64>,
+    pub(crate) wake_ns: Option<u64>,
 }
 
 impl Station {
     /// One of which the router has not begun yet.
-    pub fn new(clock: Clock) -> Self {
+    pub(crate) fn new(clock: Clock) -> Self {
         Self {
             clock,
             host: Host::default(),
@@ -206,13 +188,12 @@ impl Station {
         }
     }
 
-    /// Whether its router runs.
-    pub fn runs(&self) -> bool {
+    pub(crate) fn runs(&self) -> bool {
         self.router.is_some() && self.frozen == 0
     }
 
     /// Puts a datagram in a socket that nobody reads now; false: it is full.
-    pub fn keep(&mut self, arrived: Arrived) -> bool {
+    pub(crate) fn keep(&mut self, arrived: Arrived) -> bool {
         let port = arrived.port;
         let waiting: usize = self.sockets[port].iter().map(|other| other.bytes.len() + 256).sum();
         let fits = waiting + arrived.bytes.len() <= SOCKET_BYTES_MAX;

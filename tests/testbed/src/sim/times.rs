@@ -31,7 +31,6 @@ struct Page {
     record: Option<TimeRecord>,
     /// The term that it follows, of which configuration.
     digest: u64,
-    /// See `digest`.
     term: Term,
     /// Its clock did what bounds exclude: since when its router can have noticed, true ns; none: it has not run since.
     is_changed: bool,
@@ -47,59 +46,56 @@ struct Page {
 
 /// What the routers of a node leave to the next one.
 #[derive(Clone, Copy, Default, Debug)]
-pub struct Left {
+pub(crate) struct Left {
     /// What the page says.
-    pub record: Option<TimeRecord>,
+    pub(crate) record: Option<TimeRecord>,
     /// What was seen last of the clocks.
-    pub watched: Option<Watched>,
+    pub(crate) watched: Option<Watched>,
 }
 
-/// All pages and terms.
 #[derive(Default)]
-pub struct Times {
-    /// The clocks of all nodes.
-    pub clocks: Vec<Clock>,
+pub(crate) struct Times {
+    pub(crate) clocks: Vec<Clock>,
     /// By the digest of the configuration, and the term.
     lines: BTreeMap<(u64, Term), TermTimeline>,
     pages: Vec<Page>,
     /// Largest bound of a node that follows a master, and largest error, ns.
-    pub worst_ns: (u64, u64),
+    pub(crate) worst_ns: (u64, u64),
 }
 
 impl Times {
-    /// Of these nodes.
-    pub fn new(clocks: Vec<Clock>) -> Self {
+    pub(crate) fn new(clocks: Vec<Clock>) -> Self {
         Self { pages: vec![Page::default(); clocks.len()], clocks, ..Self::default() }
     }
 
     /// What a node's page says, for its next router.
     ///
     /// As a reader of the page has it: of a computer that has slept since, nobody knows how far off it is.
-    pub fn page(&self, now: Now, node: usize) -> Option<TimeRecord> {
+    pub(crate) fn page(&self, now: Now, node: usize) -> Option<TimeRecord> {
         let page = self.pages.get(node)?;
         page.record.map(|record| record.after_sleep(now.slept_ns.saturating_sub(page.slept_ns)))
     }
 
     /// What a node's next router goes on from.
-    pub fn left(&self, now: Now, node: usize) -> Left {
+    pub(crate) fn left(&self, now: Now, node: usize) -> Left {
         Left { record: self.page(now, node), watched: self.pages.get(node).and_then(|page| page.watched) }
     }
 
     /// How far a node's page is off what the master of a term of a configuration says, ns; none if nobody began that.
-    pub fn off_ns(&self, now: Now, node: usize, (digest, term): (u64, Term)) -> Option<u64> {
+    pub(crate) fn off_ns(&self, now: Now, node: usize, (digest, term): (u64, Term)) -> Option<u64> {
         let (line, record) = (self.lines.get(&(digest, term))?, self.pages[node].record?);
         Some(record.at(now.monotonic_ns).ns.abs_diff(self.of_line_ns(line, now.true_ns)))
     }
 
     /// What time it is by the master of a term of a configuration, ns; none if nobody began that.
-    pub fn of_term_ns(&self, now: Now, (digest, term): (u64, Term)) -> Option<u64> {
+    pub(crate) fn of_term_ns(&self, now: Now, (digest, term): (u64, Term)) -> Option<u64> {
         let line = self.lines.get(&(digest, term)).filter(|line| !line.is_void)?;
         Some(self.of_line_ns(line, now.true_ns))
     }
 
     /// A node's clock does what bounds exclude. What time it is by those terms in which it is master, nobody can say
     /// any more.
-    pub fn changes(&mut self, clock: &Clock, node: usize) {
+    pub(crate) fn changes(&mut self, clock: &Clock, node: usize) {
         self.clocks[node] = clock.clone();
         let page = &mut self.pages[node];
         (page.is_changed, page.noticed_ns) = (true, None);
@@ -107,14 +103,14 @@ impl Times {
     }
 
     /// Looks at a node after its layer of time did anything: whether it is master.
-    pub fn look(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
+    pub(crate) fn look(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
         if core.role() == Role::Master {
             self.leads(now, node, core, problems);
         }
     }
 
     /// A node's layer of time lets others see how it stands; its page says `record` from now on.
-    pub fn publish(
+    pub(crate) fn publish(
         &mut self,
         now: Now,
         node: usize,
@@ -135,7 +131,7 @@ impl Times {
     }
 
     /// A module reads its node's page, whether its router lives or not.
-    pub fn read(&mut self, now: Now, node: usize, problems: &mut Vec<Problem>) {
+    pub(crate) fn read(&mut self, now: Now, node: usize, problems: &mut Vec<Problem>) {
         let Some(record) = self.page(now, node) else { return };
         let page = &mut self.pages[node];
         // What the page said before a thread that is busy wrote it, nobody knows any more.

@@ -2,25 +2,19 @@
 
 /// Lines with their times; nothing, and at no cost, unless it was asked for.
 #[derive(Debug, Default)]
-pub struct Trace {
+pub(crate) struct Trace {
     on: bool,
-    /// The lines.
-    pub lines: Vec<String>,
+    pub(crate) lines: Vec<String>,
 }
 
 impl Trace {
     /// One that keeps lines, or none.
-    pub fn new(on: bool) -> Self {
+    pub(crate) fn new(on: bool) -> Self {
         Self { on, lines: Vec::new() }
     }
 
-    /// Whether lines are kept.
-    pub fn is_on(&self) -> bool {
-        self.on
-    }
-
     /// Adds a line; `text` is only made when it is wanted.
-    pub fn line(&mut self, true_ns: u64, text: impl FnOnce() -> String) {
+    pub(crate) fn line(&mut self, true_ns: u64, text: impl FnOnce() -> String) {
         if self.on {
             self.lines.push(format!("{:>12.6} ms  {}", true_ns as f64 / 1e6, text()));
         }

@@ -4,7 +4,7 @@ use rohrpost_routers::time::{Term, TimeEstimate};
 
 /// Source of the time from which a node computes its windows.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub enum Basis {
+pub(crate) enum Basis {
     /// Time that it has measured, or its own as a master.
     #[default]
     Own,
@@ -27,41 +27,38 @@ pub enum Basis {
 
 impl Basis {
     /// Whether it cannot know better.
-    pub fn is_misled(self) -> bool {
+    pub(crate) fn is_misled(self) -> bool {
         matches!(self, Self::Heard { is_misled: true } | Self::Overheard { is_misled: true })
     }
 }
 
 /// The time basis of a transmission, and the term that it follows.
 #[derive(Clone, Copy, Default, Debug)]
-pub struct SendBasis {
+pub(crate) struct SendBasis {
     /// By what it finds its windows.
-    pub basis: Basis,
+    pub(crate) basis: Basis,
     /// Of its configuration.
-    pub digest: u64,
+    pub(crate) digest: u64,
     /// The term of that time, as far as it knows.
-    pub term: Term,
+    pub(crate) term: Term,
     /// The line by which it reckons.
-    pub estimate: Option<TimeEstimate>,
+    pub(crate) estimate: Option<TimeEstimate>,
 }
 
 /// A datagram that is being transmitted.
 #[derive(Clone, Copy, Debug)]
-pub struct Transmission {
-    /// The node that transmits.
-    pub node: usize,
-    /// By what.
-    pub basis: Basis,
+pub(crate) struct Transmission {
+    pub(crate) node: usize,
+    pub(crate) basis: Basis,
     /// Of its configuration.
-    pub digest: u64,
+    pub(crate) digest: u64,
     /// The term of the time that it keeps.
-    pub term: Term,
+    pub(crate) term: Term,
     /// The master of that term.
-    pub master: Option<usize>,
+    pub(crate) master: Option<usize>,
     /// First and last bit, true ns.
-    pub begin_ns: u64,
-    /// See `begin_ns`.
-    pub end_ns: u64,
+    pub(crate) begin_ns: u64,
+    pub(crate) end_ns: u64,
 }
 
 impl Transmission {

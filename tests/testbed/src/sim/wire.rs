@@ -9,7 +9,7 @@ use rohrpost_routers::time::Term;
 use std::collections::{BTreeMap, VecDeque};
 
 /// From the call to the first bit, ns: usually the shorter, and by chance up to the longer.
-pub const LEAD_NS: (u64, u64) = (8 * US, 20 * US);
+pub(crate) const LEAD_NS: (u64, u64) = (8 * US, 20 * US);
 /// Clocks change their rate a little meanwhile, and stamps are a little off, ns.
 const SLACK_NS: u64 = US;
 /// Transmissions that one which begins now may still meet.
@@ -17,7 +17,7 @@ const RECENT_MAX: usize = 64;
 
 /// All that was transmitted lately.
 #[derive(Default, Debug)]
-pub struct Wire {
+pub(crate) struct Wire {
     /// When each node's interface is free again, true ns.
     free_ns: Vec<u64>,
     /// By what each sends.
@@ -30,8 +30,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// Of so many nodes.
-    pub fn new(nodes: usize) -> Self {
+    pub(crate) fn new(nodes: usize) -> Self {
         Self {
             free_ns: vec![0; nodes],
             says: vec![SendBasis::default(); nodes],
@@ -42,7 +41,7 @@ impl Wire {
     }
 
     /// From now on a node sends by this. It may have begun a time before.
-    pub fn goes_by(&mut self, now: Now, node: usize, says: SendBasis) {
+    pub(crate) fn goes_by(&mut self, now: Now, node: usize, says: SendBasis) {
         self.first_ns.entry((says.digest, says.term)).or_insert(now.true_ns);
         self.called_ns[node] = now.monotonic_ns;
         let before = self.says[node].basis;
@@ -52,7 +51,7 @@ impl Wire {
 
     /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its
     /// node.
-    pub fn window(&self, node: usize, bytes: usize, slots: &Slots, local_ns: [u64; 2]) -> Option<String> {
+    pub(crate) fn window(&self, node: usize, bytes: usize, slots: &Slots, local_ns: [u64; 2]) -> Option<String> {
         let Some(estimate) = self.says[node].estimate else {
             return Some(format!("node {node}, {bytes} bytes, by no time"));
         };
@@ -71,7 +70,7 @@ impl Wire {
 
     /// A node hands over a datagram that will reach its interface then; `bytes` with all heads. What comes of it, and
     /// whether it meets another.
-    pub fn transmit(
+    pub(crate) fn transmit(
         &mut self,
         node: usize,
         at_ns: u64,

@@ -3,50 +3,46 @@
 
 use super::guard::guard;
 use super::seen::{SEEN_IN_A_HUNDRED_REPLICATED, SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED};
-use super::simulated::number;
-use super::{keep_promises, replay, saw_enough, told};
+use super::{asked, validate};
 use rohrpost_testbed::sim::plan::Plan;
 use rohrpost_testbed::sim::run::run;
 
 /// Networks of each kind without being asked for more.
 const SEEDS: u64 = 12;
 
-fn replicated(test: &str, plan: fn(u64) -> Plan, in_a_hundred: &[(&str, u64)]) {
-    if let Some(seed) = number("ROHRPOST_SIM_SEED") {
-        return replay(plan(seed));
-    }
-    let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS);
-    let seen = keep_promises(test, seeds, plan);
-    saw_enough(&seen, seeds, in_a_hundred);
-}
-
 #[test]
 fn replicas_keep_their_promises() {
-    replicated("replicas_keep_their_promises", |seed| Plan::new(seed).replicated(), &SEEN_IN_A_HUNDRED_REPLICATED);
+    let plan = |seed| Plan::new(seed).replicated();
+    validate("replicas_keep_their_promises", asked(SEEDS), plan, &SEEN_IN_A_HUNDRED_REPLICATED);
 }
 
 #[test]
 fn sealed_replicas_keep_their_promises() {
     let plan = |seed| Plan::new(seed).sealed().replicated();
-    replicated("sealed_replicas_keep_their_promises", plan, &SEEN_IN_A_HUNDRED_REPLICATED);
+    validate("sealed_replicas_keep_their_promises", asked(SEEDS), plan, &SEEN_IN_A_HUNDRED_REPLICATED);
 }
 
 #[test]
 fn replicas_in_time_slots_keep_their_promises() {
     let plan = |seed| Plan::small_slotted(seed).replicated();
-    replicated("replicas_in_time_slots_keep_their_promises", plan, &SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED);
+    validate("replicas_in_time_slots_keep_their_promises", asked(SEEDS), plan, &SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED);
 }
 
 #[test]
 fn sealed_replicas_in_time_slots_keep_their_promises() {
     let plan = |seed| Plan::small_slotted(seed).sealed().replicated();
-    replicated("sealed_replicas_in_time_slots_keep_their_promises", plan, &SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED);
+    validate(
+        "sealed_replicas_in_time_slots_keep_their_promises",
+        asked(SEEDS),
+        plan,
+        &SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED,
+    );
 }
 
 #[test]
 fn a_seed_gives_the_same_records_again() {
     let plan = || Plan::new(3).replicated();
     let (once, again) = (run(plan(), guard, true), run(plan(), guard, true));
-    assert!(once.problems.is_empty(), "{}", told("replicas_keep_their_promises", 3, &once.problems[0]));
+    assert!(once.problems.is_empty(), "{:?}", once.problems);
     assert_eq!(once.seen, again.seen);
 }

@@ -101,6 +101,9 @@ pub(crate) fn send(sender: &mut Sender, priority: Priority, id: u32) -> Result<(
     sender.send(&label, &[&id.to_le_bytes(), &(!id).to_le_bytes()])
 }
 
+/// The scene of a role that needs nothing prepared.
+pub(crate) fn nothing(_: &Ground) {}
+
 /// Kills `role` at each step in turn; `scene` prepares, `aftermath` looks. At the last turn the victim survived and
 /// `aftermath` gets none.
 pub(crate) fn each_step<S>(

@@ -1,7 +1,7 @@
 //! Deaths of receivers.
 
 use crate::aftermath::{adopt_and_drain, all_usable, drain, empty, received};
-use crate::ground::{Ground, HIGH, LOW, MAILBOX, OTHER_SHAPE, SHAPE, each_step};
+use crate::ground::{Ground, HIGH, LOW, MAILBOX, OTHER_SHAPE, SHAPE, each_step, nothing};
 use rohrpost_mailbox_crash::{Loss, Shape};
 use std::cell::Cell;
 use std::time::Duration;
@@ -55,20 +55,15 @@ fn a_receiver_dies_asleep_in_poll() {
 
 #[test]
 fn a_receiver_dies_dropping_stale_packages() {
-    each_step(
-        "receive stale",
-        9,
-        |_| (),
-        |ground, (), death| {
-            let shape = Shape { max_age: Some(Duration::from_nanos(1)), ..SHAPE };
-            let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
-            let found = drain(ground, &mut receiver, u64::from(death.is_some()));
-            assert!(found.packages.is_empty());
-            assert!((3..=4).contains(&found.lost(Loss::Stale)), "{death:?}");
-            assert_eq!(receiver.close(), 0);
-            empty(ground);
-        },
-    );
+    each_step("receive stale", 9, nothing, |ground, (), death| {
+        let shape = Shape { max_age: Some(Duration::from_nanos(1)), ..SHAPE };
+        let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
+        let found = drain(ground, &mut receiver, u64::from(death.is_some()));
+        assert!(found.packages.is_empty());
+        assert!((3..=4).contains(&found.lost(Loss::Stale)), "{death:?}");
+        assert_eq!(receiver.close(), 0);
+        empty(ground);
+    });
 }
 
 #[test]

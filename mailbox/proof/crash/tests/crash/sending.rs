@@ -1,7 +1,7 @@
 //! Deaths of senders.
 
 use crate::aftermath::{all_usable, drain};
-use crate::ground::{Death, Ground, HIGH, LATEST, LOW, MAILBOX, OTHER_SHAPE, each_step, send};
+use crate::ground::{Death, Ground, HIGH, LATEST, LOW, MAILBOX, OTHER_SHAPE, each_step, nothing, send};
 use rohrpost_mailbox_crash::{Interest, Label, Loss, Receiver, Watches};
 use std::time::{Duration, Instant};
 
@@ -108,20 +108,15 @@ fn all_take_states(ground: &Ground, receiver: Receiver) {
 /// What it would replace has been received, which it finds out after it has said that it replaces it.
 #[test]
 fn a_sender_dies_finding_nothing_to_replace() {
-    each_step(
-        "send anew what was received",
-        8,
-        |_| (),
-        |ground, (), death| {
-            let mut receiver = ground.join().receiver(MAILBOX, LATEST).unwrap();
-            let found = drain(ground, &mut receiver, u64::from(death.is_some()));
-            assert_eq!((found.times(100), found.times(101)), (0, usize::from(accepted(death))), "{death:?}");
-            // It had said that it would, and is believed.
-            let believed = death.is_some_and(|death| death.step == "replace: marked");
-            assert_eq!(found.lost(Loss::Replaced), u64::from(believed), "{death:?}");
-            all_take_states(ground, receiver);
-        },
-    );
+    each_step("send anew what was received", 8, nothing, |ground, (), death| {
+        let mut receiver = ground.join().receiver(MAILBOX, LATEST).unwrap();
+        let found = drain(ground, &mut receiver, u64::from(death.is_some()));
+        assert_eq!((found.times(100), found.times(101)), (0, usize::from(accepted(death))), "{death:?}");
+        // It had said that it would, and is believed.
+        let believed = death.is_some_and(|death| death.step == "replace: marked");
+        assert_eq!(found.lost(Loss::Replaced), u64::from(believed), "{death:?}");
+        all_take_states(ground, receiver);
+    });
 }
 
 #[test]
@@ -231,19 +226,14 @@ fn a_sender_dies_dropping_a_loan() {
 #[test]
 fn a_sender_dies_moving_on_from_a_retired_mailbox() {
     for (role, steps_min) in [("send into a retired mailbox", 4), ("publish into a retired mailbox", 8)] {
-        each_step(
-            role,
-            steps_min,
-            |_| (),
-            |ground, (), death| {
-                let mut receiver: Receiver = ground.join().receiver(MAILBOX, OTHER_SHAPE).unwrap();
-                let found = drain(ground, &mut receiver, u64::from(death.is_some()));
-                // In the retired mailbox the same steps are passed first, so their names do not say which was the last.
-                assert!(found.times(100) <= 1, "{death:?}");
-                assert!(death.is_some() || found.times(100) == 1);
-                all_usable(ground, receiver);
-            },
-        );
+        each_step(role, steps_min, nothing, |ground, (), death| {
+            let mut receiver: Receiver = ground.join().receiver(MAILBOX, OTHER_SHAPE).unwrap();
+            let found = drain(ground, &mut receiver, u64::from(death.is_some()));
+            // In the retired mailbox the same steps are passed first, so their names do not say which was the last.
+            assert!(found.times(100) <= 1, "{death:?}");
+            assert!(death.is_some() || found.times(100) == 1);
+            all_usable(ground, receiver);
+        });
     }
 }
 

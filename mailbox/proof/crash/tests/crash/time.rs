@@ -1,6 +1,6 @@
 //! Deaths of the writer of system time.
 
-use crate::ground::{Ground, each_step};
+use crate::ground::{Ground, each_step, nothing};
 use rohrpost_mailbox_crash::{Node, SystemClock, TimeKeeper, TimeSource};
 
 const FIRST_NS: u64 = 3_000_000_000;
@@ -14,15 +14,10 @@ fn read(ground: &Ground) -> Option<(u64, u64, u64)> {
 
 #[test]
 fn a_writer_dies_beginning_the_first_epoch() {
-    each_step(
-        "begin time",
-        8,
-        |_| (),
-        |ground, (), death| {
-            let turned = death.is_none_or(|death| death.step == "cell: published");
-            assert_eq!(read(ground), turned.then_some((1, 5, 2_000_000_000)), "{death:?}");
-        },
-    );
+    each_step("begin time", 8, nothing, |ground, (), death| {
+        let turned = death.is_none_or(|death| death.step == "cell: published");
+        assert_eq!(read(ground), turned.then_some((1, 5, 2_000_000_000)), "{death:?}");
+    });
 }
 
 #[test]
@@ -39,16 +34,11 @@ fn a_writer_dies_beginning_another_epoch() {
 
 #[test]
 fn a_writer_dies_changing_the_pace() {
-    each_step(
-        "change pace",
-        8,
-        |_| (),
-        |ground, (), death| {
-            let turned = death.is_none_or(|death| death.step == "cell: published");
-            let pace = if turned { 3_000_000_000 } else { 2_000_000_000 };
-            let (epoch, seconds, found) = read(ground).unwrap();
-            assert_eq!((epoch, found), (1, pace), "{death:?}");
-            assert!(seconds >= 5);
-        },
-    );
+    each_step("change pace", 8, nothing, |ground, (), death| {
+        let turned = death.is_none_or(|death| death.step == "cell: published");
+        let pace = if turned { 3_000_000_000 } else { 2_000_000_000 };
+        let (epoch, seconds, found) = read(ground).unwrap();
+        assert_eq!((epoch, found), (1, pace), "{death:?}");
+        assert!(seconds >= 5);
+    });
 }

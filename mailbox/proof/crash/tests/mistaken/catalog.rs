@@ -1,16 +1,6 @@
 //! The mistakes, each with the scene that notices it. `broken!` asks whether its mistake is made.
 
-/// A change of the source. `from` must be there exactly once.
-pub(crate) struct Edit {
-    /// Without `.rs`.
-    pub(crate) file: &'static str,
-    pub(crate) from: &'static str,
-    pub(crate) to: &'static str,
-}
-
-const fn edit(file: &'static str, from: &'static str, to: &'static str) -> Edit {
-    Edit { file, from, to }
-}
+use rohrpost_planted::{Edit, edit, instead, left_out};
 
 /// A mistake that one could make.
 pub(crate) struct Mistake {
@@ -29,7 +19,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "what_the_dead_filled_is_published",
         edits: &[edit(
-            "slots",
+            "slots.rs",
             "freed += usize::from(self.change(slot, word, FREE));",
             "let left = if broken!(what_the_dead_filled_is_published) { Word::ready(Priority(0), 0) } else { FREE };
                 freed += usize::from(self.change(slot, word, left));",
@@ -40,14 +30,14 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     // The slot is lost for ever.
     Mistake {
         name: "claims_of_the_dead_stay",
-        edits: &[edit("slots", "if dead(by) {", "if !broken!(claims_of_the_dead_stay) && dead(by) {")],
+        edits: &[edit("slots.rs", "if dead(by) {", "if !broken!(claims_of_the_dead_stay) && dead(by) {")],
         scene: SENDING,
         says: "check Usable",
     },
     Mistake {
         name: "the_dead_forget_what_they_displaced",
         edits: &[edit(
-            "slots",
+            "slots.rs",
             "victim.into_iter().for_each(&mut lost);",
             "victim.filter(|_| !broken!(the_dead_forget_what_they_displaced)).into_iter().for_each(&mut lost);",
         )],
@@ -57,18 +47,14 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     // Sent, and its sender died before it could hint.
     Mistake {
         name: "a_search_looks_at_hints_alone",
-        edits: &[edit(
-            "queue",
-            "(0..slots.count()).for_each(|slot| self.defer(slot));",
-            "if !broken!(a_search_looks_at_hints_alone) { (0..slots.count()).for_each(|slot| self.defer(slot)); }",
-        )],
+        edits: &[left_out("queue.rs", "(0..slots.count()).for_each(|slot| self.defer(slot));")],
         scene: SENDING,
         says: "check Drained",
     },
     Mistake {
         name: "what_was_in_dead_hands_stays_there",
         edits: &[edit(
-            "slots",
+            "slots.rs",
             "if word.state() != State::Taken {",
             "if broken!(what_was_in_dead_hands_stays_there) || word.state() != State::Taken {",
         )],
@@ -79,7 +65,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "what_was_in_dead_hands_is_not_marked",
         edits: &[edit(
-            "slots",
+            "slots.rs",
             "self.change(slot, word, word.redelivered());",
             "let again = if broken!(what_was_in_dead_hands_is_not_marked) {
                     Word::ready(word.priority(), word.ticket())
@@ -93,21 +79,13 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     },
     Mistake {
         name: "poison_is_dropped_uncounted",
-        edits: &[edit(
-            "slots",
-            "poison(word.priority());",
-            "if !broken!(poison_is_dropped_uncounted) { poison(word.priority()); }",
-        )],
+        edits: &[left_out("slots.rs", "poison(word.priority());")],
         scene: "receiving::a_receiver_dies_adopting_what_killed_the_last_two",
         says: "0 counted as poison",
     },
     Mistake {
         name: "a_death_rings_nobody",
-        edits: &[edit(
-            "node",
-            "doorbell::ring_all(self);",
-            "if !broken!(a_death_rings_nobody) { doorbell::ring_all(self); }",
-        )],
+        edits: &[left_out("node.rs", "doorbell::ring_all(self);")],
         scene: "sending::a_sender_dies_beside_a_sleeping_receiver",
         says: "left: None",
     },
@@ -115,7 +93,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "the_stale_are_dropped_uncounted",
         edits: &[edit(
-            "receiver",
+            "receiver.rs",
             "self.segment.page().counters.lost(taken.word().priority(), Loss::Stale, 1);",
             "let counted = u64::from(!broken!(the_stale_are_dropped_uncounted));
             self.segment.page().counters.lost(taken.word().priority(), Loss::Stale, counted);",
@@ -126,7 +104,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "what_is_given_up_is_uncounted",
         edits: &[edit(
-            "registry",
+            "registry.rs",
             "old.page().counters.lost(taken.word().priority(), Loss::Closed, 1);",
             "let counted = u64::from(!broken!(what_is_given_up_is_uncounted));
         old.page().counters.lost(taken.word().priority(), Loss::Closed, counted);",
@@ -138,7 +116,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "equals_are_displaced",
         edits: &[edit(
-            "slots",
+            "slots.rs",
             "priority.outranks(word.priority())",
             "(priority.outranks(word.priority()) || broken!(equals_are_displaced) && priority == word.priority())",
         )],
@@ -148,7 +126,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "the_last_slot_is_overlooked",
         edits: &[edit(
-            "queue",
+            "queue.rs",
             "if slot >= slots.count() {",
             "if slot >= slots.count() - usize::from(broken!(the_last_slot_is_overlooked)) {",
         )],
@@ -158,7 +136,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "the_last_goes_first",
         edits: &[edit(
-            "slots",
+            "slots.rs",
             "if claim.place == FREE { ticket }",
             "if broken!(the_last_goes_first) { !ticket } else if claim.place == FREE { ticket }",
         )],
@@ -167,18 +145,14 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     },
     Mistake {
         name: "nothing_is_released",
-        edits: &[edit(
-            "slots",
-            "self.change(taken.slot, taken.word, FREE);",
-            "if !broken!(nothing_is_released) { self.change(taken.slot, taken.word, FREE); }",
-        )],
+        edits: &[left_out("slots.rs", "self.change(taken.slot, taken.word, FREE);")],
         scene: SENDING,
         says: "check UsableAgain",
     },
     Mistake {
         name: "closing_finds_nothing",
         edits: &[edit(
-            "receiver",
+            "receiver.rs",
             "while let Some(taken) = self.queue.take(&slots) {",
             "while let Some(taken) = self.queue.take(&slots).filter(|_| !broken!(closing_finds_nothing)) {",
         )],
@@ -191,15 +165,11 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "the_table_is_believed",
         edits: &[
             edit(
-                "node",
+                "node.rs",
                 "let alive = |index: &u16| lock::is_locked(",
                 "let alive = |index: &u16| broken!(the_table_is_believed) || lock::is_locked(",
             ),
-            edit(
-                "participant",
-                "entry.pid.store(0, Ordering::Release);",
-                "if !broken!(the_table_is_believed) { entry.pid.store(0, Ordering::Release); }",
-            ),
+            left_out("participant.rs", "entry.pid.store(0, Ordering::Release);"),
         ],
         scene: SENDING,
         says: "check Nobody",
@@ -207,7 +177,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "places_stay_locked",
         edits: &[edit(
-            "participant",
+            "participant.rs",
             "        self.leave();\n",
             "        self.leave();
         if broken!(places_stay_locked) {
@@ -219,29 +189,21 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     },
     Mistake {
         name: "the_directory_stays",
-        edits: &[edit(
-            "registry",
-            "self.directory().remove_all().map_err(failed)?;",
-            "if !broken!(the_directory_stays) { self.directory().remove_all().map_err(failed)?; }",
-        )],
+        edits: &[left_out("registry.rs", "self.directory().remove_all().map_err(failed)?;")],
         scene: SENDING,
         says: "check Gone",
     },
     // ---- streams ----
     Mistake {
         name: "a_finished_record_is_forgotten",
-        edits: &[edit(
-            "stream/writing",
-            "let next = named_end(ring, counted);",
-            "let next = if broken!(a_finished_record_is_forgotten) { counted } else { named_end(ring, counted) };",
-        )],
+        edits: &[instead("stream/writing.rs", "named_end(ring, counted)", "counted")],
         scene: "streams::a_writer_dies_writing",
         says: "a finished record",
     },
     Mistake {
         name: "the_sequence_begins_anew",
         edits: &[edit(
-            "stream/segment",
+            "stream/segment.rs",
             "unwrap_or_else(|| old.map_or(0, ",
             "unwrap_or_else(|| old.filter(|_| !broken!(the_sequence_begins_anew)).map_or(0, ",
         )],
@@ -250,13 +212,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     },
     Mistake {
         name: "half_of_what_is_left_out_stays",
-        edits: &[edit(
-            "stream/writing",
-            "                leave_out(ring, sequence, newest, (OmissionCause::Lost, before));",
-            "                if !broken!(half_of_what_is_left_out_stays) {
-                    leave_out(ring, sequence, newest, (OmissionCause::Lost, before));
-                }",
-        )],
+        edits: &[left_out("stream/writing.rs", "leave_out(ring, sequence, newest, (OmissionCause::Lost, before));")],
         scene: "streams::a_writer_of_a_replica_dies_leaving_records_out",
         says: "waits for what was left out",
     },

@@ -16,7 +16,7 @@ extern crate self as rohrpost_mailbox_crash;
 /// Whether a mistake is made now.
 macro_rules! broken {
     ($mistake:ident) => {
-        crate::noticed::is_made(stringify!($mistake))
+        rohrpost_planted::is_made(stringify!($mistake))
     };
 }
 

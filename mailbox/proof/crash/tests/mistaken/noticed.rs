@@ -1,32 +1,15 @@
 //! Runs scenes with and without a mistake.
 
 use crate::catalog::MISTAKES;
+use rohrpost_planted::{Verdict, run};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use std::sync::OnceLock;
-
-const MISTAKE: &str = "ROHRPOST_MISTAKE";
-
-/// Whether this process makes this mistake.
-pub(crate) fn is_made(mistake: &str) -> bool {
-    static MADE: OnceLock<Option<String>> = OnceLock::new();
-    MADE.get_or_init(|| std::env::var(MISTAKE).ok()).as_deref() == Some(mistake)
-}
-
-fn scenes(arguments: &[&str], mistake: &str) -> (Output, String) {
-    let mut command = Command::new(std::env::current_exe().unwrap());
-    let output = command.args(["--ignored", "--nocapture"]).args(arguments).env(MISTAKE, mistake).output().unwrap();
-    let text = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat();
-    (output, text)
-}
 
 pub(crate) fn is_noticed(name: &str) {
     let mistake = MISTAKES.iter().find(|mistake| mistake.name == name).unwrap();
-    let (output, text) = scenes(&["--exact", mistake.scene], name);
-    assert!(text.contains("running 1 test"), "{}: there is no such scene:\n{text}", mistake.scene);
-    assert!(!output.status.success(), "{} does not notice {name}", mistake.scene);
-    assert!(text.contains(mistake.says), "it should say {:?}, not:\n{text}", mistake.says);
+    let ran = run(&["--nocapture", "--exact", mistake.scene], Some(name));
+    assert_eq!(ran.verdict(), Verdict::Failed, "{} should notice {name}:\n{}", mistake.scene, ran.text);
+    assert!(ran.text.contains(mistake.says), "it should say {:?}, not:\n{}", mistake.says, ran.text);
 }
 
 /// The crash points of this source: line and name.
@@ -51,9 +34,9 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn without_a_mistake_all_scenes_pass_and_die_at_every_step() {
-    let (output, text) = scenes(&[], "");
-    assert!(output.status.success(), "{text}");
-    let died: BTreeSet<&str> = text.lines().filter_map(|line| Some(line.split_once("died at ")?.1)).collect();
+    let ran = run(&["--nocapture"], None);
+    assert!(ran.passed, "{}", ran.text);
+    let died: BTreeSet<&str> = ran.text.lines().filter_map(|line| Some(line.split_once("died at ")?.1)).collect();
     let (mut written, mut named, mut missed) = (0, BTreeSet::new(), Vec::new());
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src");
     for path in files(&folder) {

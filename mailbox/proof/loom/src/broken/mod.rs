@@ -7,7 +7,7 @@ mod room;
 mod variant;
 mod wake;
 
-pub(crate) use variant::{Broken, Edit};
+pub(crate) use variant::{Broken, ENDLESS, Edit, RACE, broken};
 
 /// Each model and the bound on its preemptions: how often loom may take the processor from a thread that could go on.
 pub(crate) const MODELS: &[(&str, usize)] = &[

@@ -1,6 +1,6 @@
 //! Mistakes in handing over bodies, hints and the order of packages.
 
-use super::variant::{Broken, Edit, FENCE_E, NO_FENCE_E, RACE, WRONG, edit};
+use super::variant::{Broken, Edit, FENCE_E, NO_FENCE_E, RACE, WRONG, broken, edit};
 
 /// Every look is one with a horizon, as after a first one that senders were quicker than.
 const ONLY_WITH_HORIZON: Edit = edit(
@@ -14,23 +14,23 @@ const WITHOUT_RETURN: Edit = edit("queue", "        if !slots.any_hint() {\n    
 pub(crate) const BROKEN: &[Broken] = &[
     // ---- the word hands the body over: (A) to (D) ----
     // The important sender's write of the body races with that of the unimportant one, which it displaces.
-    Broken {
-        name: "publish_without_release",
-        edits: &[edit(
+    broken(
+        "publish_without_release",
+        &[edit(
             "slots",
             "if !self.change(slot, claim.word, word) {",
             "if self.word(slot).compare_exchange(claim.word.0, word.0, Ordering::Acquire, Ordering::Relaxed).is_err() \
              {",
         )],
-        caught_by: "a_displaced_package_is_counted_and_not_received",
-        says: RACE,
-    },
+        "a_displaced_package_is_counted_and_not_received",
+        RACE,
+    ),
     // The receiver loses packages or reads a body while its sender writes it, whichever loom meets first. All of them
     // must go for a race on the body: the hint's Acquire or the ticket counter's, which are there for other reasons,
     // hands the body over as well as the word's.
-    Broken {
-        name: "receiver_without_acquire",
-        edits: &[
+    broken(
+        "receiver_without_acquire",
+        &[
             edit(
                 "slots",
                 "self.change(slot, seen, word).then_some",
@@ -47,48 +47,48 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("queue", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
             edit("hot", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
         ],
-        caught_by: "a_body_is_handed_over_whole",
-        says: WRONG,
-    },
+        "a_body_is_handed_over_whole",
+        WRONG,
+    ),
     // The sender's next write of the body races with the receiver's read.
-    Broken {
-        name: "release_without_release",
-        edits: &[edit(
+    broken(
+        "release_without_release",
+        &[edit(
             "slots",
             "        self.change(taken.slot, taken.word, FREE);\n",
             "        let _ = self.word(taken.slot).compare_exchange(taken.word.0, FREE.0, Ordering::Acquire, \
              Ordering::Relaxed);\n",
         )],
-        caught_by: "a_body_is_handed_over_whole",
-        says: RACE,
-    },
+        "a_body_is_handed_over_whole",
+        RACE,
+    ),
     // The same race, seen from the other side.
-    Broken {
-        name: "claim_without_acquire",
-        edits: &[edit(
+    broken(
+        "claim_without_acquire",
+        &[edit(
             "slots",
             "&& self.change(slot, FREE, word) {",
             "&& self.word(slot).compare_exchange(FREE.0, word.0, Ordering::Release, Ordering::Relaxed).is_ok() {",
         )],
-        caught_by: "a_body_is_handed_over_whole",
-        says: RACE,
-    },
+        "a_body_is_handed_over_whole",
+        RACE,
+    ),
     // Two senders have one slot.
-    Broken {
-        name: "claim_without_compare",
-        edits: &[edit(
+    broken(
+        "claim_without_compare",
+        &[edit(
             "slots",
             "&& self.change(slot, FREE, word) {",
             "&& { self.word(slot).swap(word.0, Ordering::AcqRel); true } {",
         )],
-        caught_by: "everything_arrives_once_and_in_order",
-        says: WRONG,
-    },
+        "everything_arrives_once_and_in_order",
+        WRONG,
+    ),
     // ---- hints ----
     // The receiver swaps the hint, finds the slot still Filling, and never looks again.
-    Broken {
-        name: "hint_before_word",
-        edits: &[
+    broken(
+        "hint_before_word",
+        &[
             edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
             edit(
                 "slots",
@@ -99,31 +99,27 @@ pub(crate) const BROKEN: &[Broken] = &[
                  self.hint(slot);\n",
             ),
         ],
-        caught_by: "everything_arrives_once_and_in_order",
-        says: WRONG,
-    },
+        "everything_arrives_once_and_in_order",
+        WRONG,
+    ),
     // The same, by reordering: the hint is seen before the word it speaks of.
-    Broken {
-        name: "hint_without_release",
-        edits: &[edit(
-            "hot",
-            "fetch_or(1 << (slot % 64), Ordering::SeqCst)",
-            "fetch_or(1 << (slot % 64), Ordering::Relaxed)",
-        )],
-        caught_by: "everything_arrives_once_and_in_order",
-        says: WRONG,
-    },
+    broken(
+        "hint_without_release",
+        &[edit("hot", "fetch_or(1 << (slot % 64), Ordering::SeqCst)", "fetch_or(1 << (slot % 64), Ordering::Relaxed)")],
+        "everything_arrives_once_and_in_order",
+        WRONG,
+    ),
     // And from the receiver's side.
-    Broken {
-        name: "hint_without_acquire",
-        edits: &[edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)")],
-        caught_by: "everything_arrives_once_and_in_order",
-        says: WRONG,
-    },
+    broken(
+        "hint_without_acquire",
+        &[edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)")],
+        "everything_arrives_once_and_in_order",
+        WRONG,
+    ),
     // A hint set between the look at its word and the swap is wiped out.
-    Broken {
-        name: "hints_cleared_after_the_look",
-        edits: &[
+    broken(
+        "hints_cleared_after_the_look",
+        &[
             edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.load(Ordering::Acquire)"),
             edit(
                 "queue",
@@ -132,55 +128,55 @@ pub(crate) const BROKEN: &[Broken] = &[
                  }\n            if fresh != 0 { hints.swap(0, Ordering::AcqRel); }\n",
             ),
         ],
-        caught_by: "everything_arrives_once_and_in_order",
-        says: WRONG,
-    },
+        "everything_arrives_once_and_in_order",
+        WRONG,
+    ),
     // ---- order ----
     // The receiver looks at slot 0, which is free; then both packages are published; then it sees the second in slot 1.
-    Broken {
-        name: "no_horizon",
-        edits: &[
+    broken(
+        "no_horizon",
+        &[
             ONLY_WITH_HORIZON,
             WITHOUT_RETURN,
             edit("queue", "if word.ticket() < horizon {", "if word.ticket() < u64::MAX {"),
         ],
-        caught_by: "a_second_package_never_passes_the_first",
-        says: WRONG,
-    },
+        "a_second_package_never_passes_the_first",
+        WRONG,
+    ),
     // The counter is read, but not what was published before: slot 0 looks free still.
-    Broken {
-        name: "horizon_without_acquire",
-        edits: &[
+    broken(
+        "horizon_without_acquire",
+        &[
             ONLY_WITH_HORIZON,
             WITHOUT_RETURN,
             edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
         ],
-        caught_by: "a_second_package_never_passes_the_first",
-        says: WRONG,
-    },
+        "a_second_package_never_passes_the_first",
+        WRONG,
+    ),
     // The same from the other side. Only without fence (E): it stands between a sender's hint and its next ticket.
-    Broken {
-        name: "ticket_without_release",
-        edits: &[
+    broken(
+        "ticket_without_release",
+        &[
             ONLY_WITH_HORIZON,
             WITHOUT_RETURN,
             edit("slots", "ticket.0.fetch_add(1, Ordering::AcqRel)", "ticket.0.fetch_add(1, Ordering::Acquire)"),
             edit("slots", FENCE_E, NO_FENCE_E),
         ],
-        caught_by: "a_second_package_never_passes_the_first",
-        says: WRONG,
-    },
+        "a_second_package_never_passes_the_first",
+        WRONG,
+    ),
     // A deferred slot must be looked at again though its hint is gone.
-    Broken {
-        name: "too_young_is_forgotten",
-        edits: &[ONLY_WITH_HORIZON, WITHOUT_RETURN, edit("queue", "else { self.defer(slot) }", "else { }")],
-        caught_by: "everything_arrives_once_and_in_order",
-        says: WRONG,
-    },
+    broken(
+        "too_young_is_forgotten",
+        &[ONLY_WITH_HORIZON, WITHOUT_RETURN, edit("queue", "else { self.defer(slot) }", "else { }")],
+        "everything_arrives_once_and_in_order",
+        WRONG,
+    ),
     // Claimed first, published second: the order would be that of claiming, and T no longer a horizon.
-    Broken {
-        name: "ticket_at_claim",
-        edits: &[
+    broken(
+        "ticket_at_claim",
+        &[
             edit(
                 "slots",
                 "    segment: u64,\n    word: Word,\n    /// The package that",
@@ -209,14 +205,14 @@ pub(crate) const BROKEN: &[Broken] = &[
                 "let ticket = claim.ticket;",
             ),
         ],
-        caught_by: "publishing_gives_the_order",
-        says: WRONG,
-    },
+        "publishing_gives_the_order",
+        WRONG,
+    ),
     // The first look meets the second package of a sender; the first came behind it, and no other look follows.
-    Broken {
-        name: "no_look_for_more",
-        edits: &[edit("queue", "if !slots.any_hint() {", "if true {")],
-        caught_by: "a_second_package_never_passes_the_first",
-        says: WRONG,
-    },
+    broken(
+        "no_look_for_more",
+        &[edit("queue", "if !slots.any_hint() {", "if true {")],
+        "a_second_package_never_passes_the_first",
+        WRONG,
+    ),
 ];

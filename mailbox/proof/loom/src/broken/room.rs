@@ -1,6 +1,6 @@
 //! Mistakes in full mailboxes and in replacing older packages.
 
-use super::variant::{Broken, Edit, RACE, WRONG, edit};
+use super::variant::{Broken, Edit, RACE, WRONG, broken, edit};
 
 const IN_PLACE_WITHOUT_RELEASE: Edit = edit(
     "slots",
@@ -12,107 +12,103 @@ const IN_PLACE_WITHOUT_RELEASE: Edit = edit(
 pub(crate) const BROKEN: &[Broken] = &[
     // ---- displacing ----
     // The receiver has taken the package meanwhile: it is received and counted as lost.
-    Broken {
-        name: "displace_without_compare",
-        edits: &[edit(
+    broken(
+        "displace_without_compare",
+        &[edit(
             "slots",
             "if self.change(slot, last, word) {",
             "if { self.word(slot).swap(word.0, Ordering::AcqRel); true } {",
         )],
-        caught_by: "a_displaced_package_is_counted_and_not_received",
-        says: WRONG,
-    },
+        "a_displaced_package_is_counted_and_not_received",
+        WRONG,
+    ),
     // The receiver's entry is stale: it takes whatever lies in the slot, here a package still being written.
-    Broken {
-        name: "take_without_compare",
-        edits: &[edit(
+    broken(
+        "take_without_compare",
+        &[edit(
             "slots",
             "self.change(slot, seen, word).then_some",
             "{ self.word(slot).swap(word.0, Ordering::AcqRel); true }.then_some",
         )],
-        caught_by: "a_displaced_package_is_counted_and_not_received",
-        says: RACE,
-    },
+        "a_displaced_package_is_counted_and_not_received",
+        RACE,
+    ),
     // The heap has the new package where the old one stood.
-    Broken {
-        name: "a_changed_slot_keeps_its_rank",
-        edits: &[edit(
+    broken(
+        "a_changed_slot_keeps_its_rank",
+        &[edit(
             "queue",
             "self.heap[at as usize].0 = word;\n                at as usize",
             "self.heap[at as usize].0 = word;\n                return",
         )],
-        caught_by: "displacing_keeps_the_order",
-        says: "passed",
-    },
+        "displacing_keeps_the_order",
+        "passed",
+    ),
     // The receiver takes the last package that could be displaced, and the mailbox is empty: still it is called full.
-    Broken {
-        name: "displace_overlooks_freed_slots",
-        edits: &[edit("slots", "*word == FREE || word.is_ready()", "word.is_ready()")],
-        caught_by: "a_sender_that_outranks_all_is_not_refused",
-        says: WRONG,
-    },
+    broken(
+        "displace_overlooks_freed_slots",
+        &[edit("slots", "*word == FREE || word.is_ready()", "word.is_ready()")],
+        "a_sender_that_outranks_all_is_not_refused",
+        WRONG,
+    ),
     // The loss shows nowhere.
-    Broken {
-        name: "displaced_not_counted",
-        edits: &[edit(
-            "slots",
-            "(last != FREE).then(|| Victim { priority: last.priority(), replaced: false })",
-            "None",
-        )],
-        caught_by: "two_displace_two",
-        says: WRONG,
-    },
+    broken(
+        "displaced_not_counted",
+        &[edit("slots", "(last != FREE).then(|| Victim { priority: last.priority(), replaced: false })", "None")],
+        "two_displace_two",
+        WRONG,
+    ),
     // ---- only the newest ----
     // The receiver has it in hand: it is received and counted as replaced, and its slot is freed under it.
-    Broken {
-        name: "replace_without_compare",
-        edits: &[edit(
+    broken(
+        "replace_without_compare",
+        &[edit(
             "slots",
             "if self.change(old.slot, old.word, FREE) {",
             "if { self.word(old.slot).swap(FREE.0, Ordering::AcqRel); true } {",
         )],
-        caught_by: "the_newest_replaces_what_waits",
-        says: WRONG,
-    },
+        "the_newest_replaces_what_waits",
+        WRONG,
+    ),
     // The same in a full mailbox.
-    Broken {
-        name: "reuse_without_compare",
-        edits: &[edit(
+    broken(
+        "reuse_without_compare",
+        &[edit(
             "slots",
             "let reused = self.change(old.slot, old.word, word);",
             "let reused = { self.word(old.slot).swap(word.0, Ordering::AcqRel); true };",
         )],
-        caught_by: "the_newest_reuses_the_only_slot",
-        says: WRONG,
-    },
+        "the_newest_reuses_the_only_slot",
+        WRONG,
+    ),
     // Received, and counted as replaced.
-    Broken {
-        name: "counted_though_it_was_received",
-        edits: &[edit(
+    broken(
+        "counted_though_it_was_received",
+        &[edit(
             "slots",
             "self.change(claim.slot, marked, claim.word);",
             "if true { claim.word = marked; return true; }",
         )],
-        caught_by: "the_newest_replaces_what_waits",
-        says: WRONG,
-    },
+        "the_newest_replaces_what_waits",
+        WRONG,
+    ),
     // The older one waits still, and is received after the newer or before it, but beside it.
-    Broken {
-        name: "nothing_is_replaced",
-        edits: &[edit(
+    broken(
+        "nothing_is_replaced",
+        &[edit(
             "slots",
             "        let State::Filling { by, .. } = claim.word.state() else { return false };",
             "        let State::Filling { by, .. } = claim.word.state() else { return false };\n        if true { \
              return false; }",
         )],
-        caught_by: "the_newest_keeps_its_place",
-        says: WRONG,
-    },
+        "the_newest_keeps_its_place",
+        WRONG,
+    ),
     // In a hurry: published beside the older one, in the same place of the order, and which of them goes first is
     // chance.
-    Broken {
-        name: "replaced_after_publishing",
-        edits: &[
+    broken(
+        "replaced_after_publishing",
+        &[
             edit(
                 "rig",
                 "if self.last.is_some_and(|old| slots.replace(&mut claim, old)) {",
@@ -129,27 +125,22 @@ pub(crate) const BROKEN: &[Broken] = &[
                  OverflowPolicy::Latest).then_some(posted);",
             ),
         ],
-        caught_by: "the_newest_replaces_what_waits",
-        says: "it goes back",
-    },
+        "the_newest_replaces_what_waits",
+        "it goes back",
+    ),
     // Always last in the queue: with others that send as fast as the receiver receives, it is never received.
-    Broken {
-        name: "the_newest_goes_to_the_end",
-        edits: &[edit("slots", "if claim.place == FREE { ticket } else { claim.place.ticket() }", "ticket")],
-        caught_by: "the_newest_keeps_its_place",
-        says: WRONG,
-    },
+    broken(
+        "the_newest_goes_to_the_end",
+        &[edit("slots", "if claim.place == FREE { ticket } else { claim.place.ticket() }", "ticket")],
+        "the_newest_keeps_its_place",
+        WRONG,
+    ),
     // The word is an old one, and nothing new seems to be said by it. It is taken for what it says, without its hint.
-    Broken {
-        name: "reused_without_release",
-        edits: &[IN_PLACE_WITHOUT_RELEASE],
-        caught_by: "a_displaced_package_is_not_replaced_too",
-        says: RACE,
-    },
+    broken("reused_without_release", &[IN_PLACE_WITHOUT_RELEASE], "a_displaced_package_is_not_replaced_too", RACE),
     // The same beside a free slot, where the mark hands the body over as well as the word.
-    Broken {
-        name: "a_word_comes_back_without_release",
-        edits: &[
+    broken(
+        "a_word_comes_back_without_release",
+        &[
             IN_PLACE_WITHOUT_RELEASE,
             edit(
                 "slots",
@@ -158,39 +149,35 @@ pub(crate) const BROKEN: &[Broken] = &[
                  Ordering::Relaxed).is_err() {",
             ),
         ],
-        caught_by: "a_word_comes_back_with_the_newer_package",
-        says: RACE,
-    },
+        "a_word_comes_back_with_the_newer_package",
+        RACE,
+    ),
     // The older one is gone, and a sender that dies now has told nobody.
-    Broken {
-        name: "replaces_unmarked",
-        edits: &[edit(
+    broken(
+        "replaces_unmarked",
+        &[edit(
             "slots",
             "let marked = Word::filling(by, Some(old.as_victim()));",
             "let marked = Word::filling(by, None);",
         )],
-        caught_by: "a_replacer_dies_when_the_old_one_is_gone",
-        says: "hidden",
-    },
-    Broken {
-        name: "reuses_unmarked",
-        edits: &[edit(
-            "slots",
-            "let word = Word::filling(by, Some(old.as_victim()));",
-            "let word = Word::filling(by, None);",
-        )],
-        caught_by: "a_replacer_dies_in_the_only_slot",
-        says: "hidden",
-    },
+        "a_replacer_dies_when_the_old_one_is_gone",
+        "hidden",
+    ),
+    broken(
+        "reuses_unmarked",
+        &[edit("slots", "let word = Word::filling(by, Some(old.as_victim()));", "let word = Word::filling(by, None);")],
+        "a_replacer_dies_in_the_only_slot",
+        "hidden",
+    ),
     // The counters went on elsewhere between replacing and counting.
-    Broken {
-        name: "settles_no_replaced",
-        edits: &[edit(
+    broken(
+        "settles_no_replaced",
+        &[edit(
             "slots",
             "lost(victim);\n                step!(\"settle: counted\");",
             "if !victim.replaced { lost(victim); }\n                step!(\"settle: counted\");",
         )],
-        caught_by: "a_retired_mailbox_counts_the_replaced",
-        says: "hidden",
-    },
+        "a_retired_mailbox_counts_the_replaced",
+        "hidden",
+    ),
 ];

@@ -1,15 +1,6 @@
 //! What a variant is, and what several of them change or say.
 
-/// A change of the real source. `from` must be there exactly once, so that a variant cannot rot unseen.
-pub(crate) struct Edit {
-    pub(crate) file: &'static str,
-    pub(crate) from: &'static str,
-    pub(crate) to: &'static str,
-}
-
-pub(super) const fn edit(file: &'static str, from: &'static str, to: &'static str) -> Edit {
-    Edit { file, from, to }
-}
+pub(crate) use rohrpost_planted::{Edit, edit};
 
 /// A mistake that one could make.
 pub(crate) struct Broken {
@@ -21,12 +12,21 @@ pub(crate) struct Broken {
     pub(crate) says: &'static str,
 }
 
+pub(crate) const fn broken(
+    name: &'static str,
+    edits: &'static [Edit],
+    caught_by: &'static str,
+    says: &'static str,
+) -> Broken {
+    Broken { name, edits, caught_by, says }
+}
+
 /// Two threads touch a body, and nothing orders them.
-pub(super) const RACE: &str = "Causality violation";
+pub(crate) const RACE: &str = "Causality violation";
 /// A promise was not kept.
 pub(super) const WRONG: &str = "assertion";
 /// The receiver sleeps for ever: nobody will ring.
-pub(super) const ENDLESS: &str = "maximum number of branches";
+pub(crate) const ENDLESS: &str = "maximum number of branches";
 
 pub(super) const FENCE_E: &str = "turns to less important packages likewise.\n        seq_cst_accesses();\n";
 pub(super) const NO_FENCE_E: &str = "turns to less important packages likewise.\n";

@@ -1,6 +1,7 @@
 //! What a router could do wrong with packages and datagrams.
 
-use super::planted::{Group, IN_NETWORKS, Planted, edit};
+use super::planted::{Group, IN_NETWORKS, Planted};
+use rohrpost_planted::{and_not, before, edit, instead, left_out, or};
 
 pub(crate) const CARRYING: Group = Group {
     name: "CARRYING",
@@ -10,48 +11,32 @@ pub(crate) const CARRYING: Group = Group {
             name: "SkipsCheck",
             text: "Frame: the check is not compared.",
             shows_in: "frame::tests::a_flipped_bit_is_noticed",
-            edits: &[edit(
-                "frame/mod.rs",
-                "if b[CHECK] != check(b, &[rest]).to_le_bytes() {",
-                "if b[CHECK] != check(b, &[rest]).to_le_bytes() && !broken!(SkipsCheck) {",
-            )],
+            edits: &[and_not("frame/mod.rs", "if b[CHECK] != check(b, &[rest]).to_le_bytes()")],
         },
         Planted {
             name: "IgnoresLevels",
             text: "Queue: the package that has waited longest leaves first, whatever its level.",
             shows_in: "queue::tests::urgent_ones_go_first_and_equal_ones_in_order",
-            edits: &[edit(
+            edits: &[before(
                 "queue/mod.rs",
                 "let level = bits(self.levels.into()).find(|level| self.busy[*level] & peers != 0)?;",
-                r"if broken!(IgnoresLevels) {
-            let firsts = self.peers.iter().flatten().filter_map(List::first);
-            return firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place);
-        }
-        let level = bits(self.levels.into()).find(|level| self.busy[*level] & peers != 0)?;",
+                "let firsts = self.peers.iter().flatten().filter_map(List::first); return firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place);",
             )],
         },
         Planted {
             name: "TakesNewest",
             text: "Queue: the newest package of a level leaves first.",
             shows_in: "outbound::tests::levels_go_in_order_and_datagrams_are_filled",
-            edits: &[edit(
-                "queue/mod.rs",
-                "list.first().map(Place)",
-                "if broken!(TakesNewest) { list.last() } else { list.first() }.map(Place)",
-            )],
+            edits: &[instead("queue/mod.rs", "list.first()", "list.last()")],
         },
         Planted {
             name: "SharesQuota",
             text: "Queue: a sender may use up the memory of all.",
             shows_in: "queue::tests::no_sender_uses_up_anothers_memory",
-            edits: &[edit(
+            edits: &[instead(
                 "queue/mod.rs",
-                "let quota = self.quota_blocks;",
-                r"let quota = if broken!(SharesQuota) {
-            self.entries.len() as u32 - self.used_blocks + own.used
-        } else {
-            self.quota_blocks
-        };",
+                "self.quota_blocks",
+                "self.entries.len() as u32 - self.used_blocks + own.used",
             )],
         },
         Planted {
@@ -69,13 +54,7 @@ pub(crate) const CARRYING: Group = Group {
             name: "ForgetsDisplaced",
             text: "Queue: a displaced package is not reported.",
             shows_in: "queue::tests::every_package_that_gives_way_is_told",
-            edits: &[edit(
-                "queue/mod.rs",
-                "gone(&waiting, beginning);",
-                r"if !broken!(ForgetsDisplaced) {
-            gone(&waiting, beginning);
-        }",
-            )],
+            edits: &[left_out("queue/mod.rs", "gone(&waiting, beginning);")],
         },
         Planted {
             name: "AlwaysAlone",
@@ -91,31 +70,19 @@ pub(crate) const CARRYING: Group = Group {
             name: "NeverStops",
             text: "Sending: the mailbox is emptied however much waits in the queue.",
             shows_in: IN_NETWORKS,
-            edits: &[edit(
-                "driver/free.rs",
-                "if accepts && on.outlet().queue().0.has_plenty() {",
-                "if accepts && on.outlet().queue().0.has_plenty() && !broken!(NeverStops) {",
-            )],
+            edits: &[and_not("driver/free.rs", "if accepts && on.outlet().queue().0.has_plenty()")],
         },
         Planted {
             name: "Unpaced",
             text: "Outbound: the bytes a second have no limit.",
             shows_in: "outbound::tests::the_rate_is_kept",
-            edits: &[edit(
-                "outbound/pace.rs",
-                "if from_ns <= now_ns { Ok(()) } else { Err(from_ns) }",
-                "if from_ns <= now_ns || broken!(Unpaced) { Ok(()) } else { Err(from_ns) }",
-            )],
+            edits: &[or("outbound/pace.rs", "if from_ns <= now_ns")],
         },
         Planted {
             name: "NeverInAdvance",
             text: "Outbound: a package that is more important than the last one waits for the pace as well.",
             shows_in: "outbound::tests::what_is_more_important_than_a_flood_does_not_wait_for_the_pace",
-            edits: &[edit(
-                "outbound/pace.rs",
-                "let hurries = level < self.level;",
-                "let hurries = level < self.level && !broken!(NeverInAdvance);",
-            )],
+            edits: &[and_not("outbound/pace.rs", "let hurries = level < self.level")],
         },
         Planted {
             name: "Hurries",
@@ -132,31 +99,19 @@ pub(crate) const CARRYING: Group = Group {
             name: "SendsStale",
             text: "Outbound: a package that waited too long leaves nevertheless.",
             shows_in: "outbound::tests::what_waits_too_long_is_dropped",
-            edits: &[edit(
-                "outbound/mod.rs",
-                "now_ns.saturating_sub(published_ns) > WAIT_MAX_NS",
-                "now_ns.saturating_sub(published_ns) > WAIT_MAX_NS && !broken!(SendsStale)",
-            )],
+            edits: &[and_not("outbound/mod.rs", "now_ns.saturating_sub(published_ns) > WAIT_MAX_NS")],
         },
         Planted {
             name: "NeverSilent",
             text: "Link: no peer is ever silent.",
             shows_in: "inbound::tests::incarnations::a_peer_without_a_datagram_for_a_second_is_silent",
-            edits: &[edit(
-                "link.rs",
-                "if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns {",
-                "if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns && !broken!(NeverSilent) {",
-            )],
+            edits: &[and_not("link.rs", "if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns")],
         },
         Planted {
             name: "NeverUnheard",
             text: "Link: no peer is ever deaf to this node.",
             shows_in: "inbound::tests::incarnations::a_one_way_link_is_noticed",
-            edits: &[edit(
-                "link.rs",
-                "if is_unheard { PeerLinkState::Unheard }",
-                "if is_unheard && !broken!(NeverUnheard) { PeerLinkState::Unheard }",
-            )],
+            edits: &[and_not("link.rs", "if is_unheard")],
         },
         Planted {
             name: "ReportsDelivered",
@@ -177,11 +132,7 @@ pub(crate) const CARRYING: Group = Group {
             name: "TakesCopies",
             text: "Inbound: duplicates are taken.",
             shows_in: "inbound::tests::a_window_knows_gaps_and_copies",
-            edits: &[edit(
-                "inbound/window.rs",
-                "if self.is_duplicate(sequence) {",
-                "if self.is_duplicate(sequence) && !broken!(TakesCopies) {",
-            )],
+            edits: &[and_not("inbound/window.rs", "if self.is_duplicate(sequence)")],
         },
         Planted {
             name: "CountsNoGaps",
@@ -199,57 +150,33 @@ pub(crate) const CARRYING: Group = Group {
             text: "Inbound: a package older than the last one of its flow is delivered.",
             shows_in: "inbound::tests::what_is_older_than_what_was_delivered_is_late",
             edits: &[
-                edit(
-                    "fragment/mod.rs",
-                    "older.is_late |= flow(&older.head) == flow(newer);",
-                    "older.is_late |= flow(&older.head) == flow(newer) && !broken!(TakesLate);",
-                ),
-                edit(
-                    "inbound/order.rs",
-                    "Some((last, _)) => mark <= *last,",
-                    "Some((last, _)) => mark <= *last && !broken!(TakesLate),",
-                ),
+                and_not("fragment/mod.rs", "older.is_late |= flow(&older.head) == flow(newer)"),
+                and_not("inbound/order.rs", "Some((last, _)) => mark <= *last"),
             ],
         },
         Planted {
             name: "ForgetsFloor",
             text: "Inbound: a flow without a place in the table is not ordered.",
             shows_in: "inbound::tests::a_full_table_costs_packages_but_not_the_order",
-            edits: &[edit(
-                "inbound/order.rs",
-                "None => mark <= group.floor,",
-                "None => mark <= group.floor && !broken!(ForgetsFloor),",
-            )],
+            edits: &[and_not("inbound/order.rs", "None => mark <= group.floor")],
         },
         Planted {
             name: "TakesOldIncarnations",
             text: "Inbound: datagrams of earlier incarnations are taken.",
             shows_in: "inbound::tests::incarnations::a_restarted_peer_is_known_by_its_incarnation",
-            edits: &[edit(
-                "inbound/peer.rs",
-                "let may_go_on = first.is_some() || (is_silent && goes_on);",
-                "let may_go_on = first.is_some() || (is_silent && goes_on) || broken!(TakesOldIncarnations);",
-            )],
+            edits: &[or("inbound/peer.rs", "let may_go_on = first.is_some() || (is_silent && goes_on)")],
         },
         Planted {
             name: "TakesOtherDigests",
             text: "Inbound: nodes of another configuration are not refused.",
             shows_in: "inbound::tests::refusals::another_configuration_is_refused_and_told",
-            edits: &[edit(
-                "inbound/refusing.rs",
-                "if head.digest != ours.digest {",
-                "if head.digest != ours.digest && !broken!(TakesOtherDigests) {",
-            )],
+            edits: &[and_not("inbound/refusing.rs", "if head.digest != ours.digest")],
         },
         Planted {
             name: "TakesStale",
             text: "Inbound: a datagram that waited too long in the socket is delivered.",
             shows_in: "inbound::tests::incarnations::what_waited_in_the_socket_is_not_delivered",
-            edits: &[edit(
-                "inbound/mod.rs",
-                "let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS;",
-                "let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS && !broken!(TakesStale);",
-            )],
+            edits: &[and_not("inbound/mod.rs", "let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS")],
         },
         Planted {
             name: "MixesPackages",
@@ -266,31 +193,22 @@ pub(crate) const CARRYING: Group = Group {
             name: "CountsPartsTwice",
             text: "Fragment: a fragment that comes twice counts twice.",
             shows_in: "fragment::tests::a_part_counts_once",
-            edits: &[edit(
-                "fragment/mod.rs",
-                "if !agrees || self.came[word] & bit != 0 {",
-                "if !agrees || self.came[word] & bit != 0 && !broken!(CountsPartsTwice) {",
-            )],
+            edits: &[and_not("fragment/mod.rs", "if !agrees || self.came[word] & bit != 0")],
         },
         Planted {
             name: "KeepsParts",
             text: "Fragment: no package is given up for its age.",
             shows_in: "fragment::tests::what_is_missing_for_a_second_is_given_up",
-            edits: &[edit(
+            edits: &[and_not(
                 "fragment/mod.rs",
-                "if partial.is_used && now_ns.saturating_sub(partial.touched_ns) >= PATIENCE_NS {",
-                "if partial.is_used && now_ns.saturating_sub(partial.touched_ns) >= PATIENCE_NS && !broken!(KeepsParts) {",
+                "if partial.is_used && now_ns.saturating_sub(partial.touched_ns) >= PATIENCE_NS",
             )],
         },
         Planted {
             name: "Unbounded",
             text: "Fragment: as many packages are put together at a time as have begun.",
             shows_in: "fragment::tests::memory_is_bounded_and_the_least_important_gives_way",
-            edits: &[edit(
-                "fragment/mod.rs",
-                "if self.partial.len() < PARTIAL_MAX {",
-                "if self.partial.len() < PARTIAL_MAX || broken!(Unbounded) {",
-            )],
+            edits: &[or("fragment/mod.rs", "if self.partial.len() < PARTIAL_MAX")],
         },
     ],
 };

@@ -1,6 +1,7 @@
 //! What a router could do wrong with what strangers and other nodes send.
 
-use super::planted::{Group, Planted, edit};
+use super::planted::{Group, Planted};
+use rohrpost_planted::{and_not, edit, instead, or};
 
 pub(crate) const ADMISSION: Group = Group {
     name: "ADMISSION",
@@ -11,16 +12,8 @@ pub(crate) const ADMISSION: Group = Group {
             text: "Admission: a package keeps the priority that its sender wrote.",
             shows_in: "inbound::tests::names::no_package_of_another_node_hurries_more_than_it_may",
             edits: &[
-                edit(
-                    "inbound/mod.rs",
-                    "let admitted = |head: &Head| capped(head);",
-                    "let admitted = |head: &Head| if broken!(AdmitsHurry) { *head } else { capped(head) };",
-                ),
-                edit(
-                    "session/client/incoming.rs",
-                    "let head = capped(&carried.head);",
-                    "let head = if broken!(AdmitsHurry) { carried.head } else { capped(&carried.head) };",
-                ),
+                instead("inbound/mod.rs", "capped(head)", "*head"),
+                instead("session/client/incoming.rs", "capped(&carried.head)", "carried.head"),
             ],
         },
         Planted {
@@ -47,11 +40,7 @@ pub(crate) const ADMISSION: Group = Group {
             text: "Admission: packages for a router's own mailboxes are delivered.",
             shows_in: "inbound::tests::names::a_routers_own_mailboxes_take_nothing_but_packets_of_the_tunnel",
             edits: &[
-                edit(
-                    "admission/mod.rs",
-                    "if self.is_across_systems(way, head) {",
-                    "if self.is_across_systems(way, head) && !broken!(AdmitsRoutersOwn) {",
-                ),
+                and_not("admission/mod.rs", "if self.is_across_systems(way, head)"),
                 edit(
                     "admission/mod.rs",
                     "None => Err(NotAdmitted::RoutersOwn),",
@@ -64,11 +53,7 @@ pub(crate) const ADMISSION: Group = Group {
             name: "AdmitsPackets",
             text: "Admission: any body is an IP packet of the node that it comes from.",
             shows_in: "inbound::tests::names::a_routers_own_mailboxes_take_nothing_but_packets_of_the_tunnel",
-            edits: &[edit(
-                "admission/mod.rs",
-                "Some(node) if !self.is_packet_of(node, body) => Err",
-                "Some(node) if !self.is_packet_of(node, body) && !broken!(AdmitsPackets) => Err",
-            )],
+            edits: &[and_not("admission/mod.rs", "Some(node) if !self.is_packet_of(node, body)")],
         },
     ],
 };
@@ -80,11 +65,7 @@ pub(crate) const CROWDED: Group = Group {
         name: "ForgetsBegun",
         text: "Inbound: a package in fragments is ordered by its flow's state when the last fragment comes.",
         shows_in: "inbound::tests::a_package_in_parts_is_late_only_if_something_newer_of_its_flow_went_before_it",
-        edits: &[edit(
-            "inbound/order.rs",
-            "let is_late = whole.is_late;",
-            "let is_late = if broken!(ForgetsBegun) { self.is_late(&whole.head, position) } else { whole.is_late };",
-        )],
+        edits: &[instead("inbound/order.rs", "whole.is_late", "self.is_late(&whole.head, position)")],
     }],
 };
 
@@ -96,41 +77,25 @@ pub(crate) const FORGED: Group = Group {
             name: "BelievesIncarnations",
             text: "Inbound: a new incarnation of a peer is believed at its first datagram.",
             shows_in: "inbound::tests::incarnations::lives_that_one_datagram_each_tells_of_change_nothing",
-            edits: &[edit(
-                "inbound/peer.rs",
-                "let is_doubted = !is_vouched_for && was.is_none() && !is_first;",
-                "let is_doubted = !is_vouched_for && was.is_none() && !is_first && !broken!(BelievesIncarnations);",
-            )],
+            edits: &[and_not("inbound/peer.rs", "let is_doubted = !is_vouched_for && was.is_none() && !is_first")],
         },
         Planted {
             name: "BelievesJumps",
             text: "Inbound: a sequence number far ahead is believed at once.",
             shows_in: "inbound::tests::incarnations::one_datagram_that_is_far_ahead_changes_nothing",
-            edits: &[edit(
-                "inbound/peer.rs",
-                "if !is_ahead && !is_behind {",
-                "if !is_ahead && !is_behind || broken!(BelievesJumps) {",
-            )],
+            edits: &[or("inbound/peer.rs", "if !is_ahead && !is_behind")],
         },
         Planted {
             name: "TakesOtherPorts",
             text: "Inbound: what is for another port is taken for what its sender says at this one.",
             shows_in: "inbound::tests::ports::what_is_for_another_port_changes_nothing_of_its_sender",
-            edits: &[edit(
-                "inbound/mod.rs",
-                "if !port.has_sequence(head.sequence) {",
-                "if !port.has_sequence(head.sequence) && !broken!(TakesOtherPorts) {",
-            )],
+            edits: &[and_not("inbound/mod.rs", "if !port.has_sequence(head.sequence)")],
         },
         Planted {
             name: "BelievesRefusals",
             text: "Inbound: one refusal parts this node from a peer that has just said that it hears it.",
             shows_in: "inbound::tests::refusals::refusals_of_a_peer_that_hears_us_part_nobody",
-            edits: &[edit(
-                "inbound/refusing.rs",
-                "if heard_ns > 0 && heard_ns + SILENT_AFTER_NS > now_ns {",
-                "if heard_ns > 0 && heard_ns + SILENT_AFTER_NS > now_ns && !broken!(BelievesRefusals) {",
-            )],
+            edits: &[and_not("inbound/refusing.rs", "if heard_ns > 0 && heard_ns + SILENT_AFTER_NS > now_ns")],
         },
     ],
 };
@@ -154,33 +119,21 @@ pub(crate) const LAN: Group = Group {
             text: "Security: a datagram that was opened before is opened again.",
             shows_in: "security::tests::sealed::each_opens_once_in_whatever_order_within_the_window",
             edits: &[
-                edit(
-                    "security/opening.rs",
-                    "if heard.window.is_duplicate(head.sequence) {",
-                    "if heard.window.is_duplicate(head.sequence) && !broken!(OpensTwice) {",
-                ),
-                edit(
-                    "security/opening.rs",
-                    "debug_assert!(arrival != Arrival::Duplicate);",
-                    "debug_assert!(arrival != Arrival::Duplicate || broken!(OpensTwice));",
-                ),
+                and_not("security/opening.rs", "if heard.window.is_duplicate(head.sequence)"),
+                or("security/opening.rs", "debug_assert!(arrival != Arrival::Duplicate"),
             ],
         },
         Planted {
             name: "BeginsUnproven",
             text: "Security: any sender of a hello is taken to be alive.",
             shows_in: "security::tests::handshake::only_a_living_incarnation_begins",
-            edits: &[edit(
-                "security/handshake.rs",
-                "let proves = self.is_answer(now_ns, peer, hello.answer);",
-                "let proves = self.is_answer(now_ns, peer, hello.answer) || broken!(BeginsUnproven);",
-            )],
+            edits: &[or("security/handshake.rs", "let proves = self.is_answer(now_ns, peer, hello.answer)")],
         },
         Planted {
             name: "BelievesUnopened",
             text: "Security: a datagram that cannot be opened is believed to come from a peer that is heard.",
             shows_in: "security::tests::gate::a_cause_is_believed_of_the_silent_alone",
-            edits: &[edit("inbound/refusing.rs", "if is_away {", "if is_away || broken!(BelievesUnopened) {")],
+            edits: &[or("inbound/refusing.rs", "if is_away")],
         },
     ],
 };

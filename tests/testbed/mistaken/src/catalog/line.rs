@@ -1,6 +1,7 @@
 //! What could go wrong with replicas by sessions.
 
-use super::planted::{Group, Planted, edit};
+use super::planted::{Group, Planted};
+use rohrpost_planted::{and_not, edit, or};
 
 pub(crate) const LINE: Group = Group {
     name: "LINE",
@@ -11,22 +12,14 @@ pub(crate) const LINE: Group = Group {
             text: "Replication: by a session one record after the other leaves, however many newer ones there are.",
             shows_in: "session::tests::replicas::\
                        records_are_whole_or_told_and_the_newest_is_next_whatever_goes_wrong",
-            edits: &[edit(
-                "replication/destination.rs",
-                "let behind_max = if self.by_line {",
-                "let behind_max = if self.by_line && !broken!(SendsInTurn) {",
-            )],
+            edits: &[and_not("replication/destination.rs", "let behind_max = if self.by_line")],
         },
         Planted {
             name: "HoldsNothing",
             text: "Replication: a record that leaves by a session may be overwritten meanwhile.",
             shows_in: "session::tests::replicas::\
                        pictures_come_whole_by_a_line_that_is_much_too_slow_and_poses_pass_them",
-            edits: &[edit(
-                "replication/destination.rs",
-                "let is_there = !self.by_line ||",
-                "let is_there = !self.by_line || broken!(HoldsNothing) ||",
-            )],
+            edits: &[or("replication/destination.rs", "let is_there = !self.by_line")],
         },
         Planted {
             name: "LeavesPackagesWaiting",
@@ -56,11 +49,7 @@ pub(crate) const LINE: Group = Group {
         }
         let before = first.filter(|_| !broken!(LeavesPackagesWaiting))",
                 ),
-                edit(
-                    "session/server/replicas.rs",
-                    "if member.part_turn == turn {",
-                    "if member.part_turn == turn && !broken!(LeavesPackagesWaiting) {",
-                ),
+                and_not("session/server/replicas.rs", "if member.part_turn == turn"),
             ],
         },
         Planted {

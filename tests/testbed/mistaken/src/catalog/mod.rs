@@ -10,7 +10,7 @@ mod session;
 mod slots;
 mod time;
 
-pub use planted::{Edit, Group};
+use planted::{Group, Planted};
 
 /// All mistakes.
 pub const GROUPS: &[Group] = &[
@@ -33,3 +33,8 @@ pub const GROUPS: &[Group] = &[
     time::TIME,
     time::FOLLOWER,
 ];
+
+/// Each of them.
+pub fn all() -> impl Iterator<Item = &'static Planted> {
+    GROUPS.iter().flat_map(|group| group.mistakes)
+}

@@ -1,18 +1,6 @@
 //! What a mistake of the catalogue consists of.
 
-/// A change of a source. `from` is there exactly once, so a mistake cannot rot unseen.
-pub struct Edit {
-    /// Below `routers/src`.
-    pub file: &'static str,
-    /// The source as it is.
-    pub from: &'static str,
-    /// The same with the mistake, if `broken!` says so.
-    pub to: &'static str,
-}
-
-pub(super) const fn edit(file: &'static str, from: &'static str, to: &'static str) -> Edit {
-    Edit { file, from, to }
-}
+use rohrpost_planted::Edit;
 
 /// No test of the routers' own runs what makes such a mistake; a simulated network does.
 pub const IN_NETWORKS: &str = "";

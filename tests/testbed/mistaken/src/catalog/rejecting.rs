@@ -1,7 +1,8 @@
 //! What a router could reject though nothing is wrong with it: one datagram of a hundred, or what the wire
 //! reordered: that happens only before the last fault, so nothing of it is lost when all must be well.
 
-use super::planted::{Group, IN_NETWORKS, Planted, edit};
+use super::planted::{Group, IN_NETWORKS, Planted};
+use rohrpost_planted::edit;
 
 pub(crate) const REJECTING: Group = Group {
     name: "REJECTING",

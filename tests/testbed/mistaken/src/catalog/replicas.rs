@@ -1,6 +1,7 @@
 //! What could go wrong with replicas: at their port where datagrams are sealed, and with what is left out.
 
-use super::planted::{Group, IN_NETWORKS, Planted, edit};
+use super::planted::{Group, IN_NETWORKS, Planted};
+use rohrpost_planted::{and_not, edit, instead, left_out, or};
 
 pub(crate) const REPLICAS: Group = Group {
     name: "REPLICAS",
@@ -44,13 +45,7 @@ pub(crate) const REPLICAS: Group = Group {
             name: "ComparesLengths",
             text: "Replication: of two records of one length the second is taken for unchanged.",
             shows_in: "replication::tests::changed::a_record_like_the_last_one_sent_is_left_out",
-            edits: &[edit(
-                "replication/fingerprint.rs",
-                "hasher.write(record.body());",
-                r"if !broken!(ComparesLengths) {
-            hasher.write(record.body());
-        }",
-            )],
+            edits: &[left_out("replication/fingerprint.rs", "hasher.write(record.body());")],
         },
         Planted {
             name: "TrustsWhatLeft",
@@ -91,34 +86,22 @@ pub(crate) const RECORDS: Group = Group {
             name: "MixesRecords",
             text: "Replication: a part of another record is put into the one that is open.",
             shows_in: IN_NETWORKS,
-            edits: &[edit(
-                "replication/gathering.rs",
-                "arriving.record == *record)",
-                "arriving.record == *record || broken!(MixesRecords))",
-            )],
+            edits: &[or("replication/gathering.rs", "arriving.record == *record")],
         },
         Planted {
             name: "SaysOtherIncarnation",
             text: "Replication: a record has another incarnation than at its origin.",
             shows_in: IN_NETWORKS,
-            edits: &[edit(
-                "replication/gathering.rs",
-                "            incarnation: part.incarnation,",
-                "            incarnation: if broken!(SaysOtherIncarnation) { 1 } else { part.incarnation },",
-            )],
+            edits: &[instead("replication/gathering.rs", "part.incarnation", "1")],
         },
         Planted {
             name: "CutsElsewhere",
             text: "Replication: a part has the bytes of another place of its record.",
             shows_in: IN_NETWORKS,
-            edits: &[edit(
+            edits: &[instead(
                 "replication/outgoing.rs",
-                "bytes: &record.body()[offset..end],",
-                r"bytes: if broken!(CutsElsewhere) {
-                &record.body()[offset / 2..end - offset.div_ceil(2)]
-            } else {
-                &record.body()[offset..end]
-            },",
+                "&record.body()[offset..end]",
+                "&record.body()[offset / 2..end - offset.div_ceil(2)]",
             )],
         },
         Planted {
@@ -185,16 +168,8 @@ pub(crate) const RECORDS: Group = Group {
             text: "Replication: a record is asked for at once and again, however often it was.",
             shows_in: IN_NETWORKS,
             edits: &[
-                edit(
-                    "replication/gathering.rs",
-                    "(self.is_due || is_quiet)",
-                    "(self.is_due || is_quiet || broken!(AsksForEver))",
-                ),
-                edit(
-                    "replication/gathering.rs",
-                    "self.rounds >= ROUNDS_MAX",
-                    "self.rounds >= ROUNDS_MAX && !broken!(AsksForEver)",
-                ),
+                or("replication/gathering.rs", "(self.is_due || is_quiet"),
+                and_not("replication/gathering.rs", "self.rounds >= ROUNDS_MAX"),
             ],
         },
         Planted {
@@ -219,11 +194,7 @@ pub(crate) const RECORDS: Group = Group {
             name: "PartsUnpaced",
             text: "Outbound: parts of replicas leave faster than they may.",
             shows_in: IN_NETWORKS,
-            edits: &[edit(
-                "outbound/carry.rs",
-                "if self.in_slots { Ok(()) }",
-                "if self.in_slots || broken!(PartsUnpaced) { Ok(()) }",
-            )],
+            edits: &[or("outbound/carry.rs", "if self.in_slots")],
         },
         Planted {
             name: "DescribesOnce",

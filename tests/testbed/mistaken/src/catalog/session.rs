@@ -1,6 +1,7 @@
 //! What client and server beyond the LAN could do wrong.
 
-use super::planted::{Group, Planted, edit};
+use super::planted::{Group, Planted};
+use rohrpost_planted::{and_not, before, edit, instead, left_out, or};
 
 pub(crate) const SESSION: Group = Group {
     name: "SESSION",
@@ -48,11 +49,7 @@ pub(crate) const SESSION: Group = Group {
             name: "GivesAwayOwn",
             text: "Session: names that the file gives the nodes of the own system are given to any client.",
             shows_in: "session::tests::shares::what_the_file_gives_a_node_no_other_client_gets_where_nobody_shows_a_certificate",
-            edits: &[edit(
-                "session/server/rights.rs",
-                "let is_free = |not: &Names| !not.meet(range);",
-                "let is_free = |not: &Names| !not.meet(range) || broken!(GivesAwayOwn);",
-            )],
+            edits: &[or("session/server/rights.rs", "let is_free = |not: &Names| !not.meet(range)")],
         },
         Planted {
             name: "GoesThroughAll",
@@ -84,14 +81,10 @@ pub(crate) const SESSION: Group = Group {
             name: "ReplacesOthers",
             text: "Session: a client takes the place of any that says the same incarnation.",
             shows_in: "session::tests::shares::nobody_takes_the_place_of_a_client_of_another_principal",
-            edits: &[edit(
+            edits: &[before(
                 "session/server/places.rs",
                 "let id = self.principals.id_of(owner)?;",
-                r"if broken!(ReplacesOthers) {
-            let mut all = self.incarnations.iter();
-            return all.find(|((_, its), _)| *its == incarnation).map(|(_, client)| *client);
-        }
-        let id = self.principals.id_of(owner)?;",
+                "let mut all = self.incarnations.iter(); return all.find(|((_, its), _)| *its == incarnation).map(|(_, client)| *client);",
             )],
         },
         Planted {
@@ -99,31 +92,19 @@ pub(crate) const SESSION: Group = Group {
             text: "Session: of too many connections, those of the principal with most do not give way.",
             shows_in: "session::tests::shares::one_address_does_not_push_others_out_before_their_hello",
             edits: &[
-                edit(
+                before(
                     "session/server/places.rs",
                     "let owner = if handshakes.count_of(address) == most { address } else { largest };",
-                    r"if broken!(CrowdsOut) {
-            let handshake = |(_, member): &(ClientIndex, &Member)| member.state == MemberState::Handshake;
-            return self.present().filter(handshake).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
-        }
-        let owner = if handshakes.count_of(address) == most { address } else { largest };",
+                    "let handshake = |(_, member): &(ClientIndex, &Member)| member.state == MemberState::Handshake; return self.present().filter(handshake).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);",
                 ),
-                edit(
-                    "session/server/places.rs",
-                    "newest.filter(|_| most >= own + 2)",
-                    "newest.filter(|_| most >= own + 2 && !broken!(CrowdsOut))",
-                ),
+                and_not("session/server/places.rs", "newest.filter(|_| most >= own + 2"),
             ],
         },
         Planted {
             name: "SharesQueue",
             text: "Session: packages of one principal give way to more important ones of another.",
             shows_in: "session::tests::shares::an_urgent_flood_of_a_line_leaves_others_their_share",
-            edits: &[edit(
-                "queue/shares.rs",
-                "let number = share.sender;",
-                "let number = if broken!(SharesQueue) { 0 } else { share.sender };",
-            )],
+            edits: &[instead("queue/shares.rs", "share.sender", "0")],
         },
         Planted {
             name: "IgnoresShares",
@@ -153,78 +134,57 @@ pub(crate) const SESSION: Group = Group {
             name: "DeliversOld",
             text: "Session: a package that was under way too long is delivered.",
             shows_in: "session::tests::ends::what_the_streams_held_for_too_long_is_not_delivered",
-            edits: &[edit(
-                "session/client/incoming.rs",
-                "Ok(()) if oldest_ns > AGE_MAX_NS => Err(Cause::Stale),",
-                "Ok(()) if oldest_ns > AGE_MAX_NS && !broken!(DeliversOld) => Err(Cause::Stale),",
-            )],
+            edits: &[and_not("session/client/incoming.rs", "Ok(()) if oldest_ns > AGE_MAX_NS")],
         },
         Planted {
             name: "TrustsTheWay",
             text: "Session: half of the round trip is no part of a time's bound.",
             shows_in: "session::estimate::tests::the_shortest_exchange_counts_until_it_is_old",
-            edits: &[edit(
-                "session/estimate.rs",
-                "let ways_ns = self.ways_ns.div_ceil(2);",
-                "let ways_ns = if broken!(TrustsTheWay) { 0 } else { self.ways_ns.div_ceil(2) };",
-            )],
+            edits: &[instead("session/estimate.rs", "self.ways_ns.div_ceil(2)", "0")],
         },
         Planted {
             name: "KeepsHops",
             text: "Session: a package that is handed on has no more hops than before.",
             shows_in: "session::tests::ends::a_package_that_goes_round_is_stopped",
-            edits: &[edit(
-                "session/server/carry.rs",
-                "let hops = carried.hops.saturating_add(1);",
-                "let hops = if broken!(KeepsHops) { carried.hops } else { carried.hops.saturating_add(1) };",
-            )],
+            edits: &[instead("session/server/carry.rs", "carried.hops.saturating_add(1)", "carried.hops")],
         },
         Planted {
             name: "TakesForeignNames",
             text: "Session: a client may send in the names of others.",
             shows_in: "session::tests::ends::names_of_others_are_sent_by_nobody",
-            edits: &[edit(
-                "session/server/carry.rs",
-                "let objection = if !is_own {",
-                "let objection = if !is_own && !broken!(TakesForeignNames) {",
-            )],
+            edits: &[and_not("session/server/carry.rs", "let objection = if !is_own")],
         },
         Planted {
             name: "HandsBack",
             text: "Session: a package that a client cannot deliver comes back to it.",
             shows_in: "session::tests::ends::packages_go_to_the_host_of_the_name_and_never_back",
-            edits: &[edit(
+            edits: &[or(
                 "session/server/carry.rs",
-                "let to = self.table.client_of(carried.head.to).filter(|to| *to != from);",
-                "let to = self.table.client_of(carried.head.to).filter(|to| *to != from || broken!(HandsBack));",
+                "let to = self.table.client_of(carried.head.to).filter(|to| *to != from",
             )],
         },
         Planted {
             name: "ToOwnTwice",
             text: "Session: a client that reaches its own system gets back what it sends to all systems.",
             shows_in: "session::tests::a_client_that_stands_still_changes_nothing_for_the_others",
-            edits: &[edit(
+            edits: &[and_not(
                 "session/server/carry.rs",
-                "let reaches_itself = client == from || system == own && reaches_own;",
-                "let reaches_itself = client == from || system == own && reaches_own && !broken!(ToOwnTwice);",
+                "let reaches_itself = client == from || system == own && reaches_own",
             )],
         },
         Planted {
             name: "KeepsNames",
             text: "Session: a client that has gone still hosts its names.",
             shows_in: "session::tests::sessions_keep_their_promises_whatever_goes_wrong",
-            edits: &[edit("session/server/look.rs", "if ranges > 0 {", "if ranges > 0 && !broken!(KeepsNames) {")],
+            edits: &[and_not("session/server/look.rs", "if ranges > 0")],
         },
         Planted {
             name: "ForgetsGone",
             text: "Session: packages that waited for a client that has gone are not counted.",
             shows_in: "session::tests::sessions_keep_their_promises_whatever_goes_wrong",
-            edits: &[edit(
+            edits: &[left_out(
                 "session/server/look.rs",
                 "self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));",
-                r"if !broken!(ForgetsGone) {
-            self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));
-        }",
             )],
         },
         Planted {
@@ -248,11 +208,7 @@ pub(crate) const SESSION: Group = Group {
                     "_ => is_silent || is_stalled,",
                     "_ => (is_silent && !broken!(WaitsForSilent)) || is_stalled,",
                 ),
-                edit(
-                    "session/server/look.rs",
-                    "MemberState::Member if since(member.heard_ns) > silent_after_ns =>",
-                    "MemberState::Member if since(member.heard_ns) > silent_after_ns && !broken!(WaitsForSilent) =>",
-                ),
+                and_not("session/server/look.rs", "MemberState::Member if since(member.heard_ns) > silent_after_ns"),
             ],
         },
         Planted {
@@ -260,16 +216,8 @@ pub(crate) const SESSION: Group = Group {
             text: "Session: another digest of what must be equal everywhere is accepted.",
             shows_in: "session::tests::ends::a_client_with_another_digest_takes_no_part_and_is_told_both",
             edits: &[
-                edit(
-                    "session/client/incoming.rs",
-                    "if yours != ours {",
-                    "if yours != ours && !broken!(TakesOtherCommon) {",
-                ),
-                edit(
-                    "session/server/intake.rs",
-                    "if hello.common != settings.common {",
-                    "if hello.common != settings.common && !broken!(TakesOtherCommon) {",
-                ),
+                and_not("session/client/incoming.rs", "if yours != ours"),
+                and_not("session/server/intake.rs", "if hello.common != settings.common"),
             ],
         },
         Planted {
@@ -301,34 +249,23 @@ pub(crate) const SESSION: Group = Group {
             name: "NeverBacksOff",
             text: "Session: a client tries again at once, however often it fails.",
             shows_in: "session::client::backoff::tests::waits_double_up_to_a_limit_and_differ_between_clients",
-            edits: &[edit(
+            edits: &[before(
                 "session/client/backoff.rs",
                 "let longest_ns = (FIRST_NS << self.failures).min(BACKOFF_MAX_NS);",
-                r"if broken!(NeverBacksOff) {
-            return FIRST_NS / 100;
-        }
-        let longest_ns = (FIRST_NS << self.failures).min(BACKOFF_MAX_NS);",
+                "return FIRST_NS / 100;",
             )],
         },
         Planted {
             name: "RegistersAtOnce",
             text: "Session: every registration is processed, however many one client sends.",
             shows_in: "session::tests::strain::of_many_registrations_of_one_client_the_first_and_the_last_are_looked_at",
-            edits: &[edit(
-                "session/server/registering.rs",
-                "if is_its_turn {",
-                "if is_its_turn || broken!(RegistersAtOnce) {",
-            )],
+            edits: &[or("session/server/registering.rs", "if is_its_turn")],
         },
         Planted {
             name: "NeverReplaces",
             text: "Session: packages of which only the newest counts all wait.",
             shows_in: "session::tests::newest::of_data_of_which_only_the_newest_counts_that_goes_in_the_place_of_the_first",
-            edits: &[edit(
-                "queue/mod.rs",
-                "let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head))?;",
-                "let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head) && !broken!(NeverReplaces))?;",
-            )],
+            edits: &[and_not("queue/mod.rs", "let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head)")],
         },
         Planted {
             name: "ReplacesAllData",
@@ -344,38 +281,24 @@ pub(crate) const SESSION: Group = Group {
             name: "ForgetsReplaced",
             text: "Session: a replaced package is not counted.",
             shows_in: "session::tests::newest::of_data_of_which_only_the_newest_counts_that_goes_in_the_place_of_the_first",
-            edits: &[edit(
-                "session/outgoing.rs",
-                r"if is_taken {
-        fates.replaced(&head);",
-                r"if is_taken && !broken!(ForgetsReplaced) {
-        fates.replaced(&head);",
-            )],
+            edits: &[and_not("session/outgoing.rs", "if is_taken")],
         },
         Planted {
             name: "LosesItsPlace",
             text: "Session: a package that replaces an older one waits behind all others.",
             shows_in: "session::tests::newest::of_data_of_which_only_the_newest_counts_that_goes_in_the_place_of_the_first",
-            edits: &[edit(
+            edits: &[instead(
                 "session/outgoing.rs",
-                "let is_taken = queue.replace(older, newer, body, gives_way(newer.sender, fates));",
-                r"let is_taken = if broken!(LosesItsPlace) {
-        queue.remove(older);
-        queue.push(newer, body, gives_way(newer.sender, fates))
-    } else {
-        queue.replace(older, newer, body, gives_way(newer.sender, fates))
-    };",
+                "queue.replace(older, newer, body, gives_way(newer.sender, fates))",
+                r"queue.remove(older);
+        queue.push(newer, body, gives_way(newer.sender, fates))",
             )],
         },
         Planted {
             name: "LooksAtFirst",
             text: "Session: a stale package behind a fresh one is not found.",
             shows_in: "session::tests::newest::what_stands_behind_a_fresh_one_is_given_up_in_time",
-            edits: &[edit(
-                "session/outgoing.rs",
-                "} else if !counts_newest(head) {",
-                "} else if !counts_newest(head) || broken!(LooksAtFirst) {",
-            )],
+            edits: &[or("session/outgoing.rs", "} else if !counts_newest(head)")],
         },
         Planted {
             name: "AsksLast",
@@ -389,11 +312,7 @@ pub(crate) const SESSION: Group = Group {
                     r"(None, Some(_)) if !broken!(AsksLast) => moved_ns,
             (None, _) => heard_ns,",
                 ),
-                edit(
-                    "session/outgoing.rs",
-                    "let at = self.next_frame().max(self.hurried);",
-                    "let at = if broken!(AsksLast) { self.ready.len() } else { self.next_frame().max(self.hurried) };",
-                ),
+                instead("session/outgoing.rs", "self.next_frame().max(self.hurried)", "self.ready.len()"),
             ],
         },
     ],

@@ -1,6 +1,7 @@
 //! What a router could do wrong in time slots.
 
-use super::planted::{Group, Planted, edit};
+use super::planted::{Group, Planted};
+use rohrpost_planted::{and_not, before, edit, instead, or};
 
 pub(crate) const IN_SLOT: Group = Group {
     name: "IN_SLOT",
@@ -10,33 +11,22 @@ pub(crate) const IN_SLOT: Group = Group {
             name: "OvertakesInSlot",
             text: "Outbound: in a slot a package that fits leaves before a more important one that does not.",
             shows_in: "outbound::tests::slot::a_package_that_does_not_fit_is_passed_by_no_less_important_one",
-            edits: &[edit(
-                "outbound/datagram.rs",
-                "if self.in_slots {",
-                "if self.in_slots && !broken!(OvertakesInSlot) {",
-            )],
+            edits: &[and_not("outbound/datagram.rs", "if self.in_slots")],
         },
         Planted {
             name: "OverrunsSlot",
             text: "Outbound: more leaves than the slot has room for.",
             shows_in: "outbound::tests::slot::a_datagram_leaves_only_if_it_fits",
-            edits: &[edit(
-                "outbound/slot.rs",
-                "let room_bytes = room_bytes.min(self.datagram_bytes);",
-                "let room_bytes = if broken!(OverrunsSlot) { self.datagram_bytes } else { room_bytes.min(self.datagram_bytes) };",
-            )],
+            edits: &[instead("outbound/slot.rs", "room_bytes.min(self.datagram_bytes)", "self.datagram_bytes")],
         },
         Planted {
             name: "AnyCompany",
             text: "Outbound: a datagram in a slot also carries packages that are less important than one for another peer.",
             shows_in: "outbound::tests::slot::company_is_no_less_important_than_what_waits_for_others",
-            edits: &[edit(
+            edits: &[before(
                 "outbound/slot.rs",
                 "let others = self.queue.first_level_besides(peer).unwrap_or(LEVELS as u8);",
-                r"if broken!(AnyCompany) {
-            return LEVELS as u8;
-        }
-        let others = self.queue.first_level_besides(peer).unwrap_or(LEVELS as u8);",
+                "return LEVELS as u8;",
             )],
         },
         Planted {
@@ -53,11 +43,7 @@ pub(crate) const IN_SLOT: Group = Group {
             name: "OverrunsWithPart",
             text: "Driver: a part of a replica leaves although the window is too short for it.",
             shows_in: "driver::tests::parts::records_cross_in_slots_behind_packages_and_inside_of_windows",
-            edits: &[edit(
-                "driver/parts.rs",
-                "if !tx_window.fits(now_ns, bytes) {",
-                "if !tx_window.fits(now_ns, bytes) && !broken!(OverrunsWithPart) {",
-            )],
+            edits: &[and_not("driver/parts.rs", "if !tx_window.fits(now_ns, bytes)")],
         },
         Planted {
             name: "PartsFirst",
@@ -81,27 +67,15 @@ pub(crate) const SLOTS: Group = Group {
             name: "NoLateGate",
             text: "Time slots: no wake-up is too late.",
             shows_in: "tdma::tests::single::what_is_late_is_not_sent",
-            edits: &[edit(
-                "tdma/scheduler.rs",
-                "if is_slot && now_ns > planned.begin_ns.saturating_add(GATE_NS) {",
-                "if is_slot && now_ns > planned.begin_ns.saturating_add(GATE_NS) && !broken!(NoLateGate) {",
-            )],
+            edits: &[and_not("tdma/scheduler.rs", "if is_slot && now_ns > planned.begin_ns.saturating_add(GATE_NS)")],
         },
         Planted {
             name: "SendsWhenUnsure",
             text: "Time slots: a node sends however far off its clock may be.",
             shows_in: "tdma::tests::single::silence_begins_right_above_the_allowance",
             edits: &[
-                edit(
-                    "tdma/scheduler.rs",
-                    "let own = clock.estimate().filter(|own| is_sure(own));",
-                    "let own = clock.estimate().filter(|own| is_sure(own) || broken!(SendsWhenUnsure));",
-                ),
-                edit(
-                    "tdma/scheduler.rs",
-                    "if bound_ns > allowance_ns {",
-                    "if bound_ns > allowance_ns && !broken!(SendsWhenUnsure) {",
-                ),
+                or("tdma/scheduler.rs", "let own = clock.estimate().filter(|own| is_sure(own)"),
+                and_not("tdma/scheduler.rs", "if bound_ns > allowance_ns"),
             ],
         },
         Planted {
@@ -118,33 +92,26 @@ pub(crate) const SLOTS: Group = Group {
             name: "LeadTooLong",
             text: "Time slots: calls are made earlier than frames need to reach the wire.",
             shows_in: "tdma::tests::single::no_frame_starts_before_its_slot",
-            edits: &[edit(
+            edits: &[instead(
                 "tdma/lead.rs",
                 "self.median_ns.min(self.least[0]).min(self.least[1])",
-                "if broken!(LeadTooLong) { 2 * self.median_ns } else { self.median_ns.min(self.least[0]).min(self.least[1]) }",
+                "2 * self.median_ns",
             )],
         },
         Planted {
             name: "ForgetsHandedOver",
             text: "Time slots: bytes already handed over do not count for what still fits.",
             shows_in: "tdma::tests::single::what_was_handed_over_counts",
-            edits: &[edit(
-                "tdma/tx_window.rs",
-                "self.free_ns.max(at_once_ns)",
-                "if broken!(ForgetsHandedOver) { at_once_ns } else { self.free_ns.max(at_once_ns) }",
-            )],
+            edits: &[instead("tdma/tx_window.rs", "self.free_ns.max(at_once_ns)", "at_once_ns")],
         },
         Planted {
             name: "ReplacementCalibrates",
             text: "Time slots: a replacement's Sync is taken for the master's.",
             shows_in: "tdma::tests::single::a_replacement_is_a_sign_of_life_and_nothing_else",
-            edits: &[edit(
+            edits: &[before(
                 "time/clock/slots.rs",
                 "Ok(())",
-                r"if broken!(ReplacementCalibrates) {
-            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
-        }
-        Ok(())",
+                "slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);",
             )],
         },
         Planted {
@@ -216,13 +183,10 @@ pub(crate) const JOINING: Group = Group {
             name: "TrustsItself",
             text: "Time slots: a node's own time has no bound.",
             shows_in: "tdma::tests::single::silence_begins_right_above_the_allowance",
-            edits: &[edit(
+            edits: &[before(
                 "time/clock/slots.rs",
                 "Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))",
-                r"if broken!(TrustsItself) {
-            return Some(TimeEstimate::new(TimeRecord { error_ns: 0, drift_ns_s: 0, ..record }));
-        }
-        Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))",
+                "return Some(TimeEstimate::new(TimeRecord { error_ns: 0, drift_ns_s: 0, ..record }));",
             )],
         },
         Planted {
@@ -241,11 +205,7 @@ pub(crate) const JOINING: Group = Group {
             name: "NeverBeginsEpoch",
             text: "Time: a master ignores nodes that are too far off to follow it.",
             shows_in: "tdma::tests::tables::a_node_that_does_not_hear_that_it_must_yield_silences_the_others",
-            edits: &[edit(
-                "time/clock/master.rs",
-                "if request.far {",
-                "if request.far && !broken!(NeverBeginsEpoch) {",
-            )],
+            edits: &[and_not("time/clock/master.rs", "if request.far")],
         },
     ],
 };
@@ -259,18 +219,14 @@ pub(crate) const UNPROVEN: Group = Group {
             text: "Time slots, sealed: a node begins a time whatever it hears of unverified peers.",
             shows_in: "tdma::tests::overheard::a_node_that_hears_unverified_frames_begins_no_time_for_a_while",
             edits: &[
-                edit(
+                before(
                     "time/unverified.rs",
                     "self.span_ns.map_or(0, |(first_ns, last_ns)| last_ns.min(self.ends_ns(first_ns)))",
-                    r"if broken!(IgnoresUnproven) {
-            return 0;
-        }
-        self.span_ns.map_or(0, |(first_ns, last_ns)| last_ns.min(self.ends_ns(first_ns)))",
+                    "return 0;",
                 ),
-                edit(
+                and_not(
                     "time/unverified.rs",
                     "self.span_ns.is_none_or(|(first_ns, _)| now_ns < self.ends_ns(first_ns))",
-                    "self.span_ns.is_none_or(|(first_ns, _)| now_ns < self.ends_ns(first_ns)) && !broken!(IgnoresUnproven)",
                 ),
             ],
         },
@@ -278,34 +234,23 @@ pub(crate) const UNPROVEN: Group = Group {
             name: "WaitsForEver",
             text: "Time slots, sealed: it never begins a time while it hears any.",
             shows_in: "tdma::tests::overheard::a_new_master_steps_back_until_patience_is_over",
-            edits: &[edit(
-                "time/unverified.rs",
-                "first_ns.saturating_add(self.patience_ns)",
-                "if broken!(WaitsForEver) { u64::MAX } else { first_ns.saturating_add(self.patience_ns) }",
-            )],
+            edits: &[instead("time/unverified.rs", "first_ns.saturating_add(self.patience_ns)", "u64::MAX")],
         },
         Planted {
             name: "TakesUnproven",
             text: "Time slots, sealed: messages of unverified peers are taken as if they were verified.",
             shows_in: "tdma::tests::overheard::a_hello_leaves_in_one_of_four_cycles_and_nothing_else",
-            edits: &[edit(
+            edits: &[before(
                 "time/clock/overhearing.rs",
                 "let is_other = head.digest != self.settings.digest;",
-                r"if broken!(TakesUnproven) {
-            return self.handle(now_ns, received, head, rest);
-        }
-        let is_other = head.digest != self.settings.digest;",
+                "return self.handle(now_ns, received, head, rest);",
             )],
         },
         Planted {
             name: "TellsUnproven",
             text: "Time slots, sealed: more than hellos leave by the time of unverified peers.",
             shows_in: "tdma::tests::overheard::a_hello_leaves_in_one_of_four_cycles_and_nothing_else",
-            edits: &[edit(
-                "tdma/tx_window.rs",
-                "_ if self.carries == Carries::Hello => Allowed::Nothing,",
-                "_ if self.carries == Carries::Hello && !broken!(TellsUnproven) => Allowed::Nothing,",
-            )],
+            edits: &[and_not("tdma/tx_window.rs", "_ if self.carries == Carries::Hello")],
         },
         Planted {
             name: "AsksWithoutPause",
@@ -339,14 +284,7 @@ pub(crate) const UNSTEADY: Group = Group {
             name: "SlewsUnnoticed",
             text: "Time: a clock that another process slews goes unnoticed.",
             shows_in: "time::steadiness::tests::a_clock_that_is_slewed_for_long_is_unsteady_all_the_time_and_believed_soon_after",
-            edits: &[edit(
-                "time/steadiness.rs",
-                "let began = *self.began.get_or_insert(now);",
-                r"if broken!(SlewsUnnoticed) {
-            return None;
-        }
-        let began = *self.began.get_or_insert(now);",
-            )],
+            edits: &[before("time/steadiness.rs", "let began = *self.began.get_or_insert(now);", "return None;")],
         },
     ],
 };
@@ -360,19 +298,15 @@ pub(crate) const TABLES: Group = Group {
             text: "Time slots: messages of nodes with another configuration are ignored.",
             shows_in: "tdma::tests::tables::a_node_with_an_edited_file_beside_others_sends_nothing",
             edits: &[
-                edit(
+                or(
                     "time/clock/other_tables.rs",
                     r"// Without slots two times do not disturb each other.
-        if self.slots.is_none() {",
-                    r"// Without slots two times do not disturb each other.
-        if self.slots.is_none() || broken!(DeafToOtherTables) {",
+        if self.slots.is_none()",
                 ),
-                edit(
+                or(
                     "time/clock/other_tables.rs",
                     r"pub(super) fn refused_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
-        if self.slots.is_none() {",
-                    r"pub(super) fn refused_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
-        if self.slots.is_none() || broken!(DeafToOtherTables) {",
+        if self.slots.is_none()",
                 ),
                 edit(
                     "time/clock/overhearing.rs",

@@ -1,6 +1,7 @@
 //! What a clock could do wrong.
 
-use super::planted::{Group, IN_NETWORKS, Planted, edit};
+use super::planted::{Group, IN_NETWORKS, Planted};
+use rohrpost_planted::{and_not, edit, left_out, or};
 
 pub(crate) const TIME: Group = Group {
     name: "TIME",
@@ -42,11 +43,7 @@ pub(crate) const TIME: Group = Group {
             name: "Steps",
             text: "Time: the time is set within an epoch, in place of slewing.",
             shows_in: "time::tests::promises_hold_in_every_scene",
-            edits: &[edit(
-                "time/clock/slave.rs",
-                "if master.epoch > epoch {",
-                "if master.epoch > epoch || broken!(Steps) {",
-            )],
+            edits: &[or("time/clock/slave.rs", "if master.epoch > epoch")],
         },
         Planted {
             name: "HalfBound",
@@ -62,13 +59,7 @@ pub(crate) const TIME: Group = Group {
             name: "OldSamples",
             text: "Time: measurements of an earlier master are kept.",
             shows_in: "time::tests::promises_hold_in_every_scene",
-            edits: &[edit(
-                "time/clock.rs",
-                "self.history.clear();",
-                r"if !broken!(OldSamples) {
-            self.history.clear();
-        }",
-            )],
+            edits: &[left_out("time/clock.rs", "self.history.clear();")],
         },
         Planted {
             name: "Stubborn",
@@ -99,16 +90,8 @@ pub(crate) const TIME: Group = Group {
             text: "Time: a frame is taken from whatever address it comes.",
             shows_in: IN_NETWORKS,
             edits: &[
-                edit(
-                    "driver/clock.rs",
-                    "} else if !is_from_its_node {",
-                    "} else if !is_from_its_node && !broken!(TakesAnyAddress) {",
-                ),
-                edit(
-                    "driver/clock.rs",
-                    "let is_there = |from| node == Some(from);",
-                    "let is_there = |from| node == Some(from) || broken!(TakesAnyAddress);",
-                ),
+                and_not("driver/clock.rs", "} else if !is_from_its_node"),
+                or("driver/clock.rs", "let is_there = |from| node == Some(from)"),
             ],
         },
     ],
@@ -122,15 +105,10 @@ pub(crate) const FOLLOWER: Group = Group {
         text: "Time: of answers that contradict each other the one with the smallest bound counts.",
         shows_in: "time::follower::tests::two_times_that_cannot_both_be_true_are_a_contradiction_and_no_choice",
         edits: &[
-            edit(
-                "session/estimate.rs",
-                "if self.contradicts(now_ns, &sample) {",
-                "if self.contradicts(now_ns, &sample) && !broken!(TakesSmallest) {",
-            ),
-            edit(
+            and_not("session/estimate.rs", "if self.contradicts(now_ns, &sample)"),
+            and_not(
                 "time/follower.rs",
-                "if by_ns.unsigned_abs() > error_ns.saturating_add(self.line.error_ns(now_ns)) {",
-                "if by_ns.unsigned_abs() > error_ns.saturating_add(self.line.error_ns(now_ns)) && !broken!(TakesSmallest) {",
+                "if by_ns.unsigned_abs() > error_ns.saturating_add(self.line.error_ns(now_ns))",
             ),
         ],
     }],

@@ -13,7 +13,7 @@ use rohrpost_routers::settings::Settings;
 use std::sync::Arc;
 
 /// One incarnation of a router that sends as packages come.
-pub struct Free {
+pub(crate) struct Free {
     packages: Packages,
     driver: FreeDriver,
     /// When something is due for the thread that sends, at the latest, ns of its monotonic clock.
@@ -119,8 +119,7 @@ impl Inlet for FreeSystem<'_, '_> {
 }
 
 impl Free {
-    /// An incarnation that begins now.
-    pub fn new(packages: Packages, settings: &Settings) -> Self {
+    pub(crate) fn new(packages: Packages, settings: &Settings) -> Self {
         let driver = FreeDriver::new(&Arc::new(settings.clone()));
         Self { packages, driver, due_ns: 0, wakes: Wakes::Any }
     }

@@ -11,10 +11,10 @@ mod settings;
 mod slotted;
 mod watch;
 
-pub use free::Free;
+pub(crate) use free::Free;
 use receiving::RxSystem;
 pub(super) use settings::{ROUTER_CLASS, digest};
-pub use settings::{address, settings};
+pub(crate) use settings::{address, settings};
 pub(super) use slotted::TransitAdapter;
 use watch::still_fresh;
 
@@ -40,7 +40,7 @@ use std::sync::Arc;
 use watch::{Came, Watch};
 
 /// The socket of packages.
-pub const PORT: Port = 0;
+pub(crate) const PORT: Port = 0;
 /// A router that did nothing for so long stood still: threads do not wake that late.
 const STILL_NS: u64 = 400_000_000;
 /// The thread that receives looks around so often, if nothing comes.
@@ -51,7 +51,7 @@ const FEW: usize = 4;
 const IN_HAND_BYTES_MAX: u16 = 400;
 
 /// One incarnation of a router's packages.
-pub struct Packages {
+pub(crate) struct Packages {
     settings: Settings,
     stats: Arc<Stats>,
     outbound: Outbound,
@@ -85,12 +85,10 @@ pub struct Packages {
 }
 
 impl Packages {
-    /// What it counts.
-    pub fn stats(&self) -> &Stats {
+    pub(crate) fn stats(&self) -> &Stats {
         &self.stats
     }
 
-    /// The same, for what counts beside.
     pub(super) fn all_stats(&self) -> &Arc<Stats> {
         &self.stats
     }
@@ -100,8 +98,7 @@ impl Packages {
         self.seals.as_ref().map(|seals| &seals.all)
     }
 
-    /// An incarnation that begins now.
-    pub fn new(settings: &Settings, now_ns: u64) -> Self {
+    pub(crate) fn new(settings: &Settings, now_ns: u64) -> Self {
         let stats = Stats::new(settings, now_ns);
         Self {
             outbound: Outbound::new(settings, stats.clone()),
@@ -287,7 +284,6 @@ impl Packages {
 }
 
 impl Packages {
-    /// A datagram came in.
     pub(super) fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let source = arrived.source.filter(|node| *node != io.node);
         let before = self.counted(source);
@@ -303,7 +299,6 @@ impl Packages {
         until_ns
     }
 
-    /// Its router dies now.
     pub(super) fn dies(&mut self, io: &mut Io<'_>) {
         self.check_accounts(io);
         let in_hand = self.in_hand.take().filter(|parcel| parcel.head.len <= IN_HAND_BYTES_MAX);

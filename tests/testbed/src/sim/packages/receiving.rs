@@ -7,7 +7,6 @@ use rohrpost_routers::driver::{ANSWERS, Answer, RxPlatform};
 use rohrpost_routers::report::Deliver;
 use std::collections::VecDeque;
 
-/// See above.
 pub(super) struct RxSystem<'a, 'b> {
     pub(super) io: &'a mut Io<'b>,
     /// The datagram that is being looked at.

@@ -19,13 +19,12 @@ pub(in crate::sim) fn digest(edition: usize) -> u64 {
 pub(in crate::sim) const ROUTER_CLASS: Class = Class(250);
 const TUNNEL: Tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
 
-/// Address of a node.
-pub fn address(node: usize) -> IpAddr {
+pub(crate) fn address(node: usize) -> IpAddr {
     IpAddr::V4(Ipv4Addr::new(10, 77, 0, node as u8 + 1))
 }
 
 /// What one incarnation of a router is configured with.
-pub fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> Settings {
+pub(crate) fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> Settings {
     let others = plan.nodes.iter().enumerate().filter(|(other, _)| *other != node);
     let mut routes: Vec<Route> = others
         .flat_map(|(index, other)| {

@@ -70,7 +70,6 @@ impl Packages {
         sent
     }
 
-    /// The queue has made a datagram.
     pub(in crate::sim) fn makes(&mut self, now: Now) {
         self.made = Some(now);
     }

@@ -21,7 +21,6 @@ pub(super) struct Came {
     pub(super) is_newest: bool,
 }
 
-/// Takes what the cores tell of.
 pub(super) struct Watch<'a, 'b> {
     pub(super) io: &'a mut Io<'b>,
     /// The datagram that is being looked at.

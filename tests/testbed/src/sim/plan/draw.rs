@@ -12,7 +12,6 @@ use rohrpost_routers::frame::NodeIndex;
 const CLASSES: [u8; 6] = [10, 40, 90, 140, 200, 254];
 
 impl Plan {
-    /// Two modules on different nodes.
     fn pair(&self, chance: &mut Chance) -> (usize, Name, Name) {
         let from = chance.below(self.nodes.len() as u64) as usize;
         let to = (from + 1 + chance.below(self.nodes.len() as u64 - 1) as usize) % self.nodes.len();

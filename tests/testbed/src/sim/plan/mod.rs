@@ -119,37 +119,37 @@ pub struct Plan {
     /// Which node may send when; none: each one, as packages come.
     pub slots: Option<Slots>,
     /// The same in files that somebody has edited; the first is edition 1.
-    pub edited: Vec<Slots>,
+    pub(crate) edited: Vec<Slots>,
     /// Data.
     pub flows: Vec<Flow>,
     /// Streams that other nodes have replicas of.
-    pub streams: Vec<StreamPlan>,
+    pub(crate) streams: Vec<StreamPlan>,
     /// Commands.
-    pub calls: Vec<CallPlan>,
+    pub(crate) calls: Vec<CallPlan>,
     /// What goes wrong.
-    pub faults: Vec<Planned>,
+    pub(crate) faults: Vec<Planned>,
     /// The nodes that may be master of time, in order.
     pub masters: Vec<NodeIndex>,
     /// Whether kernels stamp datagrams.
-    pub has_stamps: bool,
+    pub(crate) has_stamps: bool,
     /// Whether routers seal what they send. Then replayed datagrams are altered, too.
-    pub sealed: bool,
+    pub(crate) sealed: bool,
     /// Whether damaged datagrams are dropped by the kernel, as UDP's checksum has it; else the routers get them.
-    pub checksum: bool,
+    pub(crate) checksum: bool,
     /// All steady flows publish at once, so often, ns; none: each as its period says.
-    pub moments_ns: Option<u64>,
+    pub(crate) moments_ns: Option<u64>,
     /// No data before this, ns.
-    pub traffic_begin_ns: u64,
+    pub(crate) traffic_begin_ns: u64,
     /// No fault and no flood after this, ns.
-    pub fixed_ns: u64,
+    pub(crate) fixed_ns: u64,
     /// From then on all nodes follow one master, ns.
-    pub timed_ns: u64,
+    pub(crate) timed_ns: u64,
     /// From then on they also have its time, ns; may be after the end.
-    pub stepped_ns: u64,
+    pub(crate) stepped_ns: u64,
     /// No data and no call after this, ns.
-    pub traffic_end_ns: u64,
+    pub(crate) traffic_end_ns: u64,
     /// The end, ns.
-    pub end_ns: u64,
+    pub(crate) end_ns: u64,
 }
 
 impl Plan {
@@ -209,11 +209,10 @@ impl Plan {
     }
 
     /// The slots of an edition of the configuration.
-    pub fn slots_of(&self, edition: usize) -> Option<&Slots> {
+    pub(crate) fn slots_of(&self, edition: usize) -> Option<&Slots> {
         edition.checked_sub(1).map_or(self.slots.as_ref(), |edited| self.edited.get(edited))
     }
 
-    /// Draws what happens in the network.
     pub(super) fn draw_all(&mut self, chance: &mut Chance) {
         (self.flows, self.calls, self.faults) = Default::default();
         self.draw_flows(&mut chance.fork());
@@ -245,7 +244,7 @@ impl Plan {
     }
 
     /// How often a flow publishes with all others at once, ns.
-    pub fn moment_of(&self, flow: &Flow) -> Option<u64> {
+    pub(crate) fn moment_of(&self, flow: &Flow) -> Option<u64> {
         self.moments_ns.filter(|_| flow.burst == 1)
     }
 
@@ -258,7 +257,7 @@ impl Plan {
     }
 
     /// Whether each datagram comes behind all that its sender sent before it.
-    pub fn is_in_order(&self) -> bool {
+    pub(crate) fn is_in_order(&self) -> bool {
         let is_deceit = |its: &Planned| matches!(its.fault, Fault::Forged { .. } | Fault::Stray { .. });
         self.quality.reorder_ppm == 0 && self.faults.iter().all(is_deceit)
     }
@@ -324,7 +323,7 @@ impl Plan {
 }
 
 /// What is left of a link's quality after the faults.
-pub fn fixed(quality: Quality) -> Quality {
+pub(crate) fn fixed(quality: Quality) -> Quality {
     Quality { loss_ppm: 0, copy_ppm: 0, reorder_ppm: 0, damage_ppm: 0, rate_bytes_s: 0, ..quality }
 }
 

@@ -144,7 +144,6 @@ impl Plan {
         }
     }
 
-    /// Notes which faults divide the network.
     pub(in crate::sim) fn divide(&mut self) {
         let divisions = Divisions::of(&self.faults, self.shape.interval_ns);
         if let Some(slots) = &mut self.slots {

@@ -9,9 +9,8 @@ use std::sync::OnceLock;
 /// Bodies are cut from it: no two parts of it are alike.
 const PATTERN_BYTES: usize = 1 << 19;
 
-/// All records of all streams.
 #[derive(Default)]
-pub struct RecordBooks {
+pub(crate) struct RecordBooks {
     /// By their place in the plan.
     pub(super) streams: Vec<StreamBook>,
     /// Since all was well, by place and receiver: records that were sent, and those that came whole.
@@ -34,7 +33,6 @@ pub(super) struct StreamBook {
     pub(super) newest: Option<(u32, u64)>,
 }
 
-/// A record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct WrittenRecord {
     pub(super) generation: u32,
@@ -67,8 +65,7 @@ pub(super) fn start_of(stream: usize, incarnation: u32, sequence: u64, len: usiz
 }
 
 impl RecordBooks {
-    /// Of the streams of a plan.
-    pub fn new(streams: &[StreamPlan]) -> Self {
+    pub(crate) fn new(streams: &[StreamPlan]) -> Self {
         Self { streams: streams.iter().map(|_| StreamBook::default()).collect(), ..Self::default() }
     }
 
@@ -101,7 +98,6 @@ impl RecordBooks {
         Ok(*record)
     }
 
-    /// The newest record of a stream.
     pub(super) fn newest(&self, stream: usize) -> Option<(u64, WrittenRecord)> {
         let book = &self.streams[stream];
         let newest = book.newest?;

@@ -60,7 +60,6 @@ impl Outlet for PartSystem<'_, '_> {
 }
 
 impl FreeReplicas {
-    /// An incarnation that begins now.
     pub(in crate::sim) fn new(replicas: Replicas, settings: &Settings) -> Self {
         Self { replicas, driver: ReplicaDriver::new(settings), due_ns: 0, is_deaf: false }
     }

@@ -21,7 +21,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// The socket of replicas.
-pub const PORT: Port = 2;
+pub(crate) const PORT: Port = 2;
 /// Parts of a record leave again as often as it has parts, and so many times more.
 const MORE_AGAIN: u64 = 8;
 /// A record is asked for so often at most since the last part came by itself.
@@ -183,7 +183,6 @@ impl Leaving {
         }
     }
 
-    /// A request leaves: not too often.
     fn asks(&mut self, io: &mut Io<'_>, to: NodeIndex, request: &PartRequest) {
         io.oracle.saw("a request for parts");
         let PartRequest { place, router, generation, sequence, first, .. } = *request;

@@ -20,11 +20,11 @@ mod rings;
 mod stream;
 mod streams;
 
-pub use books::RecordBooks;
+pub(crate) use books::RecordBooks;
 pub(super) use free::FreeReplicas;
-pub use leaving::PORT;
-pub use rings::Rings;
-pub use stream::StreamPlan;
+pub(crate) use leaving::PORT;
+pub(crate) use rings::Rings;
+pub(crate) use stream::StreamPlan;
 pub(super) use streams::Streams;
 
 use super::clock::Now;
@@ -47,7 +47,7 @@ use std::time::Duration;
 const LOOK_EVERY_NS: u64 = 500_000_000;
 
 /// One incarnation of a router's replicas.
-pub struct Replicas {
+pub(crate) struct Replicas {
     rings: Rc<Rings>,
     participant: Arc<Participant>,
     sender: ReplicaSender,
@@ -60,7 +60,7 @@ pub struct Replicas {
 
 impl Replicas {
     /// An incarnation that begins now. `all`: what its packages count.
-    pub fn new(
+    pub(crate) fn new(
         (settings, all): (&Settings, &Arc<Stats>),
         rings: &Rc<Rings>,
         peer_sessions: Option<&Arc<PeerSessions>>,
@@ -95,33 +95,33 @@ impl Replicas {
     }
 
     /// With time slots: the thread that looks for streams has its turn, unless that of the slots has their lock.
-    pub fn find_streams(&mut self, io: &mut Io<'_>) {
+    pub(crate) fn find_streams(&mut self, io: &mut Io<'_>) {
         if !io.chance.percent(10) {
             self.look(io);
         }
     }
 
     /// With time slots: the next part; its receiver and its length.
-    pub fn next_part(&mut self, io: &mut Io<'_>, datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
+    pub(crate) fn next_part(&mut self, io: &mut Io<'_>, datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
         let (time, rings) = (NodeTime::of(io), &self.rings);
         let system = |real_ns| time.at(rings.simulated_ns(real_ns));
         part_for_slot(&mut self.sender, self.leaving.queue(), io.now.monotonic_ns, system, datagram)
     }
 
     /// With time slots: hands a part to the kernel.
-    pub fn send_part(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: &[u8]) {
+    pub(crate) fn send_part(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: &[u8]) {
         if self.leaving.hand_over(io, to, bytes).is_err() {
             self.leaving.queue().unsent(bytes, &[], &mut leaving::NoPackages);
         }
     }
 
     /// What must hold at any time.
-    pub fn check(&mut self, io: &mut Io<'_>, well: bool) {
+    pub(crate) fn check(&mut self, io: &mut Io<'_>, well: bool) {
         self.accounts.check(io, &self.rings, well);
     }
 
     /// What must hold at the end.
-    pub fn close(&mut self, io: &mut Io<'_>) {
+    pub(crate) fn close(&mut self, io: &mut Io<'_>) {
         self.accounts.close(io, &self.rings);
     }
 }

@@ -15,7 +15,6 @@ const ON_THE_WAY: u64 = 64;
 const READ_MAX: u64 = 64;
 
 impl World<'_> {
-    /// The next record of a stream.
     pub(in crate::sim) fn write(&mut self, stream: usize) {
         let its = self.plan.streams[stream].clone();
         if self.now_ns >= self.plan.traffic_end_ns {

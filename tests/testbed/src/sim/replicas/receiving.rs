@@ -68,7 +68,6 @@ struct TakenCounts {
 }
 
 impl Replicas {
-    /// A datagram came in.
     pub(in crate::sim) fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let (now_ns, arrived_ns) = (io.now.monotonic_ns, arrived.stamp.monotonic_ns);
         if self.driver.passes_over(now_ns.saturating_sub(arrived_ns)) {

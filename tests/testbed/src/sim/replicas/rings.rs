@@ -15,9 +15,7 @@ const MEMORY: &str = "/dev/shm";
 /// A record that arrives so much later is told, ns.
 const ALARM_NS: u64 = 5_000_000;
 
-/// All of a network.
-pub struct Rings {
-    /// Goes with the last of them.
+pub(crate) struct Rings {
     _folder: tempfile::TempDir,
     nodes: Vec<Arc<Node>>,
     replicas: Vec<ReplicaSettings>,
@@ -31,7 +29,7 @@ impl Rings {
     ///
     /// # Panics
     /// If this computer has no room for them.
-    pub fn new(plan: &Plan) -> Self {
+    pub(crate) fn new(plan: &Plan) -> Self {
         let folder = tempfile::tempdir_in(Path::new(MEMORY)).expect("there is room for rings");
         let node = |node: usize| Node::create(&folder.path().join(node.to_string()), 0o700).expect("and for a node");
         // Without streams nobody opens a node.
@@ -42,12 +40,11 @@ impl Rings {
     }
 
     /// What routers are configured with.
-    pub fn replicas(&self) -> &[ReplicaSettings] {
+    pub(crate) fn replicas(&self) -> &[ReplicaSettings] {
         &self.replicas
     }
 
-    /// A computer's node.
-    pub fn node(&self, node: usize) -> &Arc<Node> {
+    pub(crate) fn node(&self, node: usize) -> &Arc<Node> {
         &self.nodes[node]
     }
 
@@ -55,7 +52,7 @@ impl Rings {
     ///
     /// # Panics
     /// If too many did.
-    pub fn join(&self, node: usize) -> Arc<Participant> {
+    pub(crate) fn join(&self, node: usize) -> Arc<Participant> {
         Participant::join(self.node(node), Name::NONE).expect("a node has room for programs")
     }
 

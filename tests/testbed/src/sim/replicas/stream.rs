@@ -4,38 +4,36 @@ use rohrpost_config::Sampling;
 use rohrpost_mailbox::{StreamId, StreamShape};
 use rohrpost_network::LEVELS;
 
-/// One stream.
 #[derive(Clone, Debug)]
-pub struct StreamPlan {
-    /// Which.
-    pub id: StreamId,
+pub(crate) struct StreamPlan {
+    pub(crate) id: StreamId,
     /// The node on which it is written.
-    pub node: usize,
+    pub(crate) node: usize,
     /// What it is there and on all others.
-    pub shape: StreamShape,
+    pub(crate) shape: StreamShape,
     /// The nodes that have a replica, one bit each.
-    pub to: u64,
+    pub(crate) to: u64,
     /// Which records are sent.
-    pub sampling: Sampling,
+    pub(crate) sampling: Sampling,
     /// Of these only those with other bytes.
-    pub changed: bool,
+    pub(crate) changed: bool,
     /// See [`ReplicaSettings`](rohrpost_routers::replication::ReplicaSettings).
-    pub deadline_ns: u64,
+    pub(crate) deadline_ns: u64,
     /// From one record to the next, ns.
-    pub period_ns: u64,
+    pub(crate) period_ns: u64,
     /// Shortest and longest record.
-    pub bytes: (u64, u64),
+    pub(crate) bytes: (u64, u64),
     /// Of a hundred records, those with the bytes of the one before.
-    pub same_percent: u64,
+    pub(crate) same_percent: u64,
     /// Whether the wire carries it; else its records may all be overwritten while they leave.
-    pub is_carried: bool,
+    pub(crate) is_carried: bool,
     /// Node and pause between two looks of each reader, ns.
-    pub readers: Vec<(usize, u64)>,
+    pub(crate) readers: Vec<(usize, u64)>,
 }
 
 impl StreamPlan {
     /// The level of its writer's class.
-    pub fn level(&self, bulk_below: u8) -> u8 {
+    pub(crate) fn level(&self, bulk_below: u8) -> u8 {
         let class = self.id.name.class().0;
         if class < bulk_below { LEVELS as u8 - 1 } else { (15 - (class >> 4)) * 2 }
     }
@@ -45,8 +43,7 @@ impl StreamPlan {
         self.changed || self.sampling != Sampling::Each
     }
 
-    /// Whether a node has a replica.
-    pub fn is_on(&self, node: usize) -> bool {
+    pub(crate) fn is_on(&self, node: usize) -> bool {
         self.to & 1 << node != 0
     }
 }

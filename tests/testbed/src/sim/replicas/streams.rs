@@ -6,7 +6,6 @@ use rohrpost_mailbox::{Name, StreamReader, StreamWriter};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// All of a network.
 pub(in crate::sim) struct Streams {
     pub(super) rings: Rc<Rings>,
     pub(super) writers: Vec<Option<StreamWriter>>,
@@ -50,7 +49,6 @@ impl Streams {
         self.readers.len()
     }
 
-    /// A module says what it is.
     pub(super) fn describe(&mut self, node: usize, module: Name) {
         let edition = self.editions.entry(module).or_default();
         *edition += 1;

@@ -25,7 +25,7 @@ use std::time::Duration;
 use watch::{TimeWatch, UnverifiedPeer};
 
 /// The socket of time.
-pub const PORT: Port = 1;
+pub(crate) const PORT: Port = 1;
 /// How far off a kernel's stamp is at most, ns; the kernel stamps CLOCK_REALTIME, and the other clock is read around
 /// it.
 const DOUBT_NS: u32 = 100;
@@ -36,7 +36,7 @@ const APART_NS: u64 = 300;
 const AWAITED_MAX: usize = 256;
 
 /// What one incarnation of a router's time is configured with.
-pub fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> TimeSettings {
+pub(crate) fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> TimeSettings {
     let slots = plan.slots_of(edition);
     TimeSettings {
         system: SYSTEM,
@@ -50,13 +50,12 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> T
 }
 
 /// One incarnation of a router's time.
-pub struct Ticking {
+pub(crate) struct Ticking {
     driver: ClockDriver,
     socket: TimeSocket,
     watch: TimeWatch,
 }
 
-/// Its socket.
 struct TimeSocket {
     has_stamps: bool,
     /// Which datagrams are to be stamped, by how many went before.
@@ -152,7 +151,7 @@ impl TimePlatform for TimeSystem<'_, '_> {
 impl Ticking {
     /// An incarnation that begins now; `left` is what the node's page says. Without kernel stamps it makes do with its
     /// own.
-    pub fn new(settings: TimeSettings, now: Now, left: Left, has_stamps: bool) -> Self {
+    pub(crate) fn new(settings: TimeSettings, now: Now, left: Left, has_stamps: bool) -> Self {
         let addresses = (0..settings.nodes).map(|node| address(node.into())).collect();
         let start = TimeStart {
             looked: seen(now),
@@ -178,11 +177,10 @@ impl Ticking {
     }
 
     /// The core, so that mistakes can be switched on.
-    pub fn clock(&mut self) -> &mut Clock {
+    pub(crate) fn clock(&mut self) -> &mut Clock {
         self.driver.clock_mut()
     }
 
-    /// The same, to be read.
     pub(super) fn core(&self) -> &Clock {
         self.driver.clock()
     }

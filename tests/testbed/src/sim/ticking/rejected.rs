@@ -43,7 +43,6 @@ impl TimeRejections {
         Rejection::ALL.map(|why| self.all.as_ref().map_or(0, |all| all.rejections(Port::Time).of(source, why)))
     }
 
-    /// A datagram is read.
     pub(super) fn reads(&mut self, arrived: &Arrived) {
         self.before = self.counted(arrived);
     }
@@ -72,7 +71,6 @@ impl TimeRejections {
         }
     }
 
-    /// A frame of time was opened.
     pub(super) fn opens(&mut self, io: &mut Io<'_>, arrived: &Arrived, source: TimeSource, head: &FrameHead, own: u64) {
         let is_sent = matches!(arrived.origin, Origin::Sent { .. });
         let is_wrong = match source {

@@ -101,18 +101,15 @@ impl TimeWatch {
         Self { rejections: TimeRejections::of(Some(all.clone())), ..self }
     }
 
-    /// A datagram is read.
     pub(super) fn reads(&mut self, arrived: Arrived) {
         self.rejections.reads(&arrived);
         self.arrived = Some(arrived);
     }
 
-    /// The page is written.
     pub(super) fn writes(&mut self, record: &TimeRecord) {
         self.written = Some(*record);
     }
 
-    /// The driver does something.
     pub(super) fn happened(&mut self, io: &mut Io<'_>, clock: &Clock, event: TimeEvent<'_>) {
         match event {
             TimeEvent::Unsteady { why, .. } => {
@@ -227,7 +224,6 @@ impl TimeWatch {
         Some(UnverifiedPeer { estimate, term: latest.map_or(Term::NONE, |told| told.term), is_misled })
     }
 
-    /// Looks at what the clock does.
     fn look(&mut self, io: &mut Io<'_>, clock: &Clock) {
         if io.stood_still() {
             return;

@@ -33,29 +33,23 @@ use std::rc::Rc;
 
 /// Makes the layers of a router that begins to live: node, which edition of the configuration it has, incarnation, its
 /// clocks, what its page of system time says.
-pub type NewLayers<'a> = Box<dyn FnMut(usize, usize, u32, Now, Left) -> Vec<Box<dyn Layer>> + 'a>;
+pub(crate) type NewLayers<'a> = Box<dyn FnMut(usize, usize, u32, Now, Left) -> Vec<Box<dyn Layer>> + 'a>;
 
-/// One run.
-pub struct World<'a> {
-    /// What is to happen.
-    pub plan: Rc<Plan>,
+pub(crate) struct World<'a> {
+    pub(crate) plan: Rc<Plan>,
     pub(super) now_ns: u64,
     events: Events<Event>,
     pub(super) chance: Chance,
-    /// The computers.
-    pub stations: Vec<Station>,
+    pub(crate) stations: Vec<Station>,
     /// From, to.
     pub(super) links: Vec<Vec<Link>>,
     pub(super) servers: BTreeMap<Name, Server>,
     pub(super) sequences: Vec<u32>,
-    /// The books.
-    pub oracle: Oracle,
+    pub(crate) oracle: Oracle,
     /// The modules that write streams, and those that read them.
     pub(super) streams: Streams,
-    /// The calls.
-    pub calls: Calls,
-    /// What is written down.
-    pub trace: Trace,
+    pub(crate) calls: Calls,
+    pub(crate) trace: Trace,
     new_layers: NewLayers<'a>,
     lives: u32,
     /// The incarnation of each node's router.
@@ -72,7 +66,7 @@ const OLD_MAX: usize = 64;
 
 impl<'a> World<'a> {
     /// A network as planned. `rings`: of its nodes; `layers` makes routers, `guard` makes what lets commands run.
-    pub fn new(plan: Rc<Plan>, guard: NewGuard, rings: &Rc<Rings>, layers: NewLayers<'a>, trace: bool) -> Self {
+    pub(crate) fn new(plan: Rc<Plan>, guard: NewGuard, rings: &Rc<Rings>, layers: NewLayers<'a>, trace: bool) -> Self {
         let mut chance = Chance::new(plan.seed ^ 0x5eed);
         let count = plan.nodes.len();
         let mut stations = Vec::new();
@@ -141,13 +135,12 @@ impl<'a> World<'a> {
         self.events.push(at_ns, event);
     }
 
-    /// The clocks of a node.
-    pub fn now(&self, node: usize) -> Now {
+    pub(crate) fn now(&self, node: usize) -> Now {
         self.stations[node].clock.at(self.now_ns)
     }
 
     /// Runs to the end, or to the first broken promise.
-    pub fn run(&mut self) -> &[Problem] {
+    pub(crate) fn run(&mut self) -> &[Problem] {
         while let Some((at_ns, event)) = self.events.pop() {
             if at_ns > self.plan.end_ns || !self.oracle.problems.is_empty() {
                 break;
