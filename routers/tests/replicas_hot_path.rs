@@ -15,7 +15,7 @@ use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::{FrameHead, NodeIndex, ReplicaFrame};
 use rohrpost_routers::inbound::{Datagram, Envelope, Inbound};
 use rohrpost_routers::outbound::{Outbound, OutboundStep};
-use rohrpost_routers::replication::{Describe, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
+use rohrpost_routers::replication::{ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
 use rohrpost_routers::security::{Gate, Port, Sealing, TAG_BYTES};
 use rohrpost_routers::settings::Settings;
@@ -31,14 +31,6 @@ const MS: u64 = 1_000_000;
 const BEGIN_NS: u64 = 1000 * MS;
 const ID: StreamId = StreamId { name: Name::new(1, 112, 0, 0), number: 2 };
 const RECORDS: u64 = 200;
-
-struct Always;
-
-impl Describe for Always {
-    fn number(&self, _: &[u8], _: &str) -> Option<u16> {
-        Some(ID.number)
-    }
-}
 
 /// Takes parts at this time, ns.
 struct Parts(ReplicaReceiver, u64);
@@ -96,7 +88,8 @@ impl End {
     fn new(node: &Arc<Node>, settings: &Settings, replica: &ReplicaSettings) -> Self {
         let replicas = std::slice::from_ref(replica);
         let mut sender = ReplicaSender::new(settings, replicas);
-        let receiver = ReplicaReceiver::new(settings, replicas, join(node), Arc::new(Always));
+        let receiver =
+            ReplicaReceiver::new(settings, replicas, join(node), Arc::new(|_: &[u8], _: &str| Some(ID.number)));
         Self {
             parts: Parts(receiver.asking_by(sender.requests()), BEGIN_NS),
             sender,
@@ -190,7 +183,7 @@ fn parts_take_nothing_from_the_heap() {
         let [mut origin, mut holder] = ends;
         join(&nodes[0]).describe_replicas(ID.name, b"of a camera").unwrap();
         let mut writer = join(&nodes[0]).stream_writer(ID, shape).unwrap();
-        origin.sender.look(&join(&nodes[0]), &Always);
+        origin.sender.look(&join(&nodes[0]), &|_: &[u8], _: &str| Some(ID.number));
         let mut reader = join(&nodes[1]).stream_reader(ID).unwrap();
         let (body, mut before, mut left, mut now_ns) = (vec![7; record_bytes as usize], 0, 0, BEGIN_NS);
         let (mut records, mut lost) = (0, 0);

@@ -10,7 +10,7 @@ use counting::{CountingHeap, heap_uses};
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Name, Next, Node, Participant, Stamp, StreamId, StreamShape, SystemTime};
 use rohrpost_routers::frame::{FrameKind, NodeIndex, ReplicaFrame};
-use rohrpost_routers::replication::{Describe, LINE_PART_ROOM, LineReplicas, LineSettings, ReplicaSettings};
+use rohrpost_routers::replication::{LINE_PART_ROOM, LineReplicas, LineSettings, ReplicaSettings};
 use rohrpost_routers::session::frame::{SessionFrameHead, SessionFrameKind, SessionMessage};
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,14 +23,6 @@ const ID: StreamId = StreamId { name: Name::new(1, 112, 0, 0), number: 2 };
 const RECORDS: u64 = 200;
 const SERVER: NodeIndex = 0;
 const LAPTOP: NodeIndex = 1;
-
-struct Always;
-
-impl Describe for Always {
-    fn number(&self, _: &[u8], _: &str) -> Option<u16> {
-        Some(ID.number)
-    }
-}
 
 fn join(node: &Arc<Node>) -> Arc<Participant> {
     Participant::join(node, Name::NONE).unwrap()
@@ -59,7 +51,7 @@ fn line(own: NodeIndex, node: &Arc<Node>, shape: StreamShape) -> LineReplicas {
         received: vec![replica(received)],
     };
     let time = |ns| SystemTime { ns, epoch: 1, error: Duration::ZERO, age: Duration::ZERO };
-    LineReplicas::new(&settings, join(node), Arc::new(Always), Box::new(time))
+    LineReplicas::new(&settings, join(node), Arc::new(|_: &[u8], _: &str| Some(ID.number)), Box::new(time))
 }
 
 /// As a frame of a session.

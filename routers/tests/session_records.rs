@@ -7,9 +7,7 @@
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Name, Next, Node, Participant, StreamId, StreamReader, StreamShape, SystemTime};
 use rohrpost_routers::frame::{DescriptionPart, NodeIndex, RecordPart, ReplicaFrame};
-use rohrpost_routers::replication::{
-    Describe, LINE_PART_BYTES, LineReplicas, LineSettings, ReplicaLoss, ReplicaSettings,
-};
+use rohrpost_routers::replication::{LINE_PART_BYTES, LineReplicas, LineSettings, ReplicaLoss, ReplicaSettings};
 use rohrpost_routers::session::frame::{SessionFrameHead, SessionMessage};
 use std::fmt::Write;
 use std::path::Path;
@@ -25,14 +23,6 @@ const SERVER: NodeIndex = 0;
 const LAPTOP: NodeIndex = 1;
 const SECOND: u64 = 1_000_000_000;
 const STAMP_NS: u64 = 1_700_000_000_000_000_000;
-
-struct Always;
-
-impl Describe for Always {
-    fn number(&self, _: &[u8], _: &str) -> Option<u16> {
-        Some(ID.number)
-    }
-}
 
 /// The description of the page, which has a stream `steps`.
 fn description() -> Vec<u8> {
@@ -96,7 +86,12 @@ impl Case {
         };
         let time = |ns| SystemTime { ns, epoch: 1, error: Duration::ZERO, age: Duration::ZERO };
         let participant = Participant::join(&node, Name::NONE).unwrap();
-        let laptop = LineReplicas::new(&settings, participant.clone(), Arc::new(Always), Box::new(time));
+        let laptop = LineReplicas::new(
+            &settings,
+            participant.clone(),
+            Arc::new(|_: &[u8], _: &str| Some(ID.number)),
+            Box::new(time),
+        );
         Self {
             what,
             laptop,

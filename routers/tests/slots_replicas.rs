@@ -11,7 +11,7 @@ use common::{PATIENCE, Segment, Station, module, name};
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Name, Next, Participant, Stamp, StreamId, StreamReader, StreamShape, StreamWriter};
 use rohrpost_network::Security;
-use rohrpost_routers::replication::{Describe, ReplicaLoss, ReplicaSettings};
+use rohrpost_routers::replication::{ReplicaLoss, ReplicaSettings};
 use rohrpost_routers::security::{Port, Rejection};
 use rohrpost_routers::shell::ReplicaParts;
 use rohrpost_testbed::stalls::unless_stalled;
@@ -25,14 +25,6 @@ const NUMBER: u16 = 2;
 const RECORDS: u64 = 60;
 /// A computer that stands still may have dropped a part of the newest: then the next one says so.
 const AGAIN: Duration = Duration::from_millis(300);
-
-struct Always;
-
-impl Describe for Always {
-    fn number(&self, _: &[u8], _: &str) -> Option<u16> {
-        Some(NUMBER)
-    }
-}
 
 fn id() -> StreamId {
     StreamId { name: module(0), number: NUMBER }
@@ -58,7 +50,12 @@ fn replicate(segment: &mut Segment) -> (Writing, [Reading; 2]) {
     for station in stations {
         let _inside = lab.enter(&name(station.own)).unwrap();
         let impair = Some("loss=1%,seed=22".parse().unwrap());
-        let parts = ReplicaParts { replicas: &replicas, describe: Arc::new(Always), socket: None, impair };
+        let parts = ReplicaParts {
+            replicas: &replicas,
+            describe: Arc::new(|_: &[u8], _: &str| Some(NUMBER)),
+            socket: None,
+            impair,
+        };
         station.shell.as_mut().unwrap().replicate(&station.node, parts).unwrap();
     }
     segment.wait_until_all_send();

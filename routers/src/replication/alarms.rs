@@ -49,21 +49,13 @@ impl DelayAlarm {
     }
 }
 
-/// Tells missing records of one replica.
-#[derive(Default)]
-pub(super) struct LossAlarm {
-    told: Throttle,
-}
-
-impl LossAlarm {
-    /// Notes how many records are missing before one that is in the replica now.
-    pub(super) fn note(&mut self, now_ns: u64, records: u64, settings: &ReplicaSettings) {
-        if let Some(records) = self.told.note_all(now_ns, TOLD_EVERY_NS, records) {
-            tracing::warn!(
-                "{records} records of {} are missing here: lost on the way, too late behind newer ones, or passed over \
-                 where they were written faster than the wire carries them (`rohrpost net` counts the causes)",
-                settings.stream
-            );
-        }
+/// Notes how many records of a replica are missing before one that is in it now, and tells that.
+pub(super) fn note_missing(told: &mut Throttle, now_ns: u64, records: u64, settings: &ReplicaSettings) {
+    if let Some(records) = told.note_all(now_ns, TOLD_EVERY_NS, records) {
+        tracing::warn!(
+            "{records} records of {} are missing here: lost on the way, too late behind newer ones, or passed over \
+             where they were written faster than the wire carries them (`rohrpost net` counts the causes)",
+            settings.stream
+        );
     }
 }

@@ -15,7 +15,7 @@ mod due;
 mod ending;
 mod open;
 
-use super::alarms::{DelayAlarm, LossAlarm};
+use super::alarms::DelayAlarm;
 use super::answer_time::{AnswerTime, Unanswered};
 use super::counts::{ReceivedReplica, ReplicaLoss};
 use super::description::{DescriptionAssembly, KnownOrigin};
@@ -26,6 +26,7 @@ use crate::frame::RecordPart;
 use open::OpenRecords;
 use rohrpost_mailbox::{
     OriginRecord, Participant, RecordInfo, ReplicaError, ReplicaWriter, STREAM_SEQUENCE_MAX, StreamId, SystemTime,
+    Throttle,
 };
 use rtrb::Producer;
 use std::sync::Arc;
@@ -81,7 +82,8 @@ pub(super) struct IncomingReplica {
     /// What is wrong with it was told.
     told: bool,
     delays: DelayAlarm,
-    losses: LossAlarm,
+    /// When missing records were told.
+    missing_told: Throttle,
 }
 
 impl IncomingReplica {
@@ -109,7 +111,7 @@ impl IncomingReplica {
             has_asked: false,
             told: false,
             delays: DelayAlarm::default(),
-            losses: LossAlarm::default(),
+            missing_told: Throttle::default(),
         }
     }
 

@@ -47,7 +47,7 @@ pub struct LineReplicas {
     server: NodeIndex,
     nodes: Vec<(NodeIndex, Name)>,
     participant: Arc<Participant>,
-    describe: Arc<dyn Describe>,
+    describe: Arc<Describe>,
     time: TellsTime,
     destinations: Vec<LineDestination>,
     receiver: ReplicaReceiver,
@@ -62,7 +62,7 @@ impl LineReplicas {
     pub fn new(
         settings: &LineSettings,
         participant: Arc<Participant>,
-        describe: Arc<dyn Describe>,
+        describe: Arc<Describe>,
         time: TellsTime,
     ) -> Self {
         let all = settings.sent.iter().fold(0, |all, replica| all | replica.to);

@@ -69,11 +69,9 @@ pub const LINE_PART_ROOM: usize = RECORD_PART_HEAD_BYTES + LINE_PART_BYTES;
 /// Descriptions are sent when a node comes and when they change; and this often, if the other end could not use one.
 const LINE_DESCRIBE_EVERY_NS: u64 = 10_000_000_000;
 
-/// Reads what this crate does not know.
-pub trait Describe: Send + Sync {
-    /// The number of the stream of this name, by the description of its module; none: it has no such stream.
-    fn number(&self, description: &[u8], item: &str) -> Option<u16>;
-}
+/// Reads what this crate does not know: by the description of a module, the number of its stream of this name; none: it
+/// has no such stream.
+pub type Describe = dyn Fn(&[u8], &str) -> Option<u16> + Send + Sync;
 
 /// Bytes of each part of a record but the last: what a datagram has room for. Equal on all nodes.
 fn part_bytes(settings: &Settings) -> usize {

@@ -34,8 +34,8 @@ pub(super) struct OutgoingReplica {
 }
 
 impl OutgoingReplica {
-    /// For those of `peers` that have it. `by_line`: nothing is lost on the way to them, and records are held here until
-    /// they have left.
+    /// For those of `peers` that have it. `by_line`: nothing is lost on the way to them, and records are held here
+    /// until they have left.
     pub(super) fn new(
         (place, replica): (u16, &ReplicaSettings),
         peers: impl Iterator<Item = NodeIndex>,
@@ -60,13 +60,13 @@ impl OutgoingReplica {
         }
     }
 
-    pub(super) fn look(&mut self, participant: &Arc<Participant>, describe: &dyn Describe) {
+    pub(super) fn look(&mut self, participant: &Arc<Participant>, describe: &Describe) {
         let (from, item) = (self.settings.from, &self.settings.item);
         let Some(words) = participant.node().about(from) else { return };
         if self.reader.is_some() && self.description.is(&words) {
             return;
         }
-        let number = describe.number(&words, item).filter(|_| words.len() <= DESCRIPTION_BYTES_MAX);
+        let number = describe(&words, item).filter(|_| words.len() <= DESCRIPTION_BYTES_MAX);
         let Some(number) = number else {
             return self.tell(&format!(
                 "its description names no such stream, or has more than {DESCRIPTION_BYTES_MAX} bytes"

@@ -22,7 +22,7 @@ const LOOK_EVERY_NS: u64 = 500_000;
 /// The receiving half of all replicas of a node. One thread has it.
 pub struct ReplicaReceiver {
     participant: Arc<Participant>,
-    describe: Arc<dyn Describe>,
+    describe: Arc<Describe>,
     /// By place in the configuration; none: this node has no such replica.
     streams: Vec<Option<IncomingReplica>>,
     /// Of other nodes, to the thread that sends; none: nothing is sent again.
@@ -40,7 +40,7 @@ impl ReplicaReceiver {
         settings: &Settings,
         replicas: &[ReplicaSettings],
         participant: Arc<Participant>,
-        describe: Arc<dyn Describe>,
+        describe: Arc<Describe>,
     ) -> Self {
         Self::of(settings.own, (part_bytes(settings), false), replicas, participant, describe)
     }
@@ -51,7 +51,7 @@ impl ReplicaReceiver {
         (part_bytes, by_line): (usize, bool),
         replicas: &[ReplicaSettings],
         participant: Arc<Participant>,
-        describe: Arc<dyn Describe>,
+        describe: Arc<Describe>,
     ) -> Self {
         let incoming = |(place, replica): (u16, &ReplicaSettings)| {
             let is_here = replica.to & 1 << own != 0 && replica.node != own;
@@ -163,7 +163,7 @@ impl ReplicaReceiver {
         if !stream.may_describe(now_ns) {
             return stream.lose(ReplicaLoss::Undescribed);
         }
-        let Some(number) = self.describe.number(&words, &stream.settings.item) else {
+        let Some(number) = (self.describe)(&words, &stream.settings.item) else {
             stream.lose(ReplicaLoss::Undescribed);
             return stream.tell("the description that came with it names no such stream");
         };

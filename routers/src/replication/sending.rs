@@ -91,7 +91,7 @@ impl ReplicaSender {
     }
 
     /// Looks which modules have begun, and what they say of their streams. A few system calls: call it now and then.
-    pub fn look(&mut self, participant: &Arc<Participant>, describe: &dyn Describe) {
+    pub fn look(&mut self, participant: &Arc<Participant>, describe: &Describe) {
         self.by_level.streams.iter_mut().for_each(|stream| stream.look(participant, describe));
     }
 

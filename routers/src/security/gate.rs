@@ -137,7 +137,7 @@ impl Gate {
         inbound: &Inbound,
         reply: &mut [u8],
     ) -> Option<OutgoingHello> {
-        let outcome = self.handshake.as_mut()?.receive_other(now_ns, head, opened, reply);
+        let outcome = self.handshake.as_mut()?.take(now_ns, head, opened, false, reply);
         if outcome.proves && opened.hello.next[Port::Time as usize] > 0 {
             inbound.tells_other(now_ns, head);
         }

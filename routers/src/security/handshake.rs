@@ -78,19 +78,9 @@ impl Handshake {
         self.take(now_ns, head, opened, true, datagram)
     }
 
-    /// The same for a peer with another digest: no incarnation begins. A challenge is answered, so that its sender
-    /// knows that this node lives, and by which configuration.
-    pub fn receive_other(
-        &mut self,
-        now_ns: u64,
-        head: &FrameHead,
-        opened: &OpenedHello,
-        datagram: &mut [u8],
-    ) -> HelloOutcome {
-        self.take(now_ns, head, opened, false, datagram)
-    }
-
-    fn take(
+    /// The same; of a peer with another digest no incarnation may begin. A challenge of it is answered, so that its
+    /// sender knows that this node lives, and by which configuration.
+    pub(super) fn take(
         &mut self,
         now_ns: u64,
         head: &FrameHead,

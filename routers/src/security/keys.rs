@@ -1,10 +1,11 @@
 //! The keys of an installation, and those that are derived from them: one for each direction, port and pair of
-//! incarnations.
+//! incarnations. Random numbers that are fit for keys are the one thing that is asked of the system here.
 
 use super::seal::Seal;
 use crate::frame::NodeIndex;
 use ring::aead::{CHACHA20_POLY1305, LessSafeKey, UnboundKey};
 use ring::hkdf::{self, HKDF_SHA256, Prk, Salt};
+use ring::rand::{SecureRandom, SystemRandom};
 use std::fmt;
 use std::num::NonZeroU8;
 
@@ -12,6 +13,21 @@ use std::num::NonZeroU8;
 pub const KEY_BYTES: usize = 32;
 /// Tells these keys from whatever else may be derived from the same secret.
 const SALT: &[u8] = b"rohrpost datagrams, version 1";
+
+/// The system gave none.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("the system has no random numbers (getrandom); is this a kernel before 3.17?")]
+pub struct NoRandom;
+
+/// Random bytes that are fit for keys, from the system. Just after booting it waits until there are any.
+///
+/// # Errors
+/// [`NoRandom`]
+pub fn random<const N: usize>() -> Result<[u8; N], NoRandom> {
+    let mut bytes = [0; N];
+    SystemRandom::new().fill(&mut bytes).map_err(|_| NoRandom)?;
+    Ok(bytes)
+}
 
 /// Which key a datagram is sealed with: byte 7 of its head, where 0 says that it is not.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]

@@ -129,8 +129,8 @@ impl Opening {
     }
 
     /// Opens a datagram that [`Self::is_strange`]: some incarnation of its node has said it to this node at some time.
-    /// For each incarnation that is named a key is derived, which costs about as much as to open a datagram. `is_there`:
-    /// see [`Self::open_from`].
+    /// For each incarnation that is named a key is derived, which costs about as much as to open a datagram.
+    /// `is_there`: see [`Self::open_from`].
     ///
     /// # Errors
     /// [`NotOpened`]

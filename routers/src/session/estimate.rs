@@ -52,9 +52,7 @@ impl RoundTripSample {
         let ways_ns = self.ways_ns.div_ceil(2);
         ways_ns + drift_ns as u64 + 1
     }
-}
 
-impl RoundTripSample {
     /// The server's session clock by this exchange, ns.
     fn session_ns(&self, now_ns: u64) -> u64 {
         let heard_ns = self.answer.left_ns.saturating_add(self.ways_ns / 2);

@@ -18,13 +18,10 @@ pub(super) struct Ledger<'a, H> {
 }
 
 impl<'a, H> Ledger<'a, H> {
-    pub(super) fn new(counts: &'a SessionCounts, host: &'a mut H, holder: Option<&'a str>) -> Self {
-        Self { counts, host, holder, principals: None, answers: Vec::new() }
-    }
-
-    /// It also counts losses for lack of room by sender.
-    pub(super) fn by_principal(self, principals: &'a mut Principals) -> Self {
-        Self { principals: Some(principals), ..self }
+    /// `to`: the client for which the packages are, and the principals by which losses for lack of room are counted.
+    pub(super) fn new(counts: &'a SessionCounts, host: &'a mut H, to: Option<(&'a str, &'a mut Principals)>) -> Self {
+        let (holder, principals) = to.unzip();
+        Self { counts, host, holder, principals, answers: Vec::new() }
     }
 
     /// What the senders of lost commands are to be told.

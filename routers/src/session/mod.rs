@@ -25,7 +25,6 @@ mod estimate;
 pub mod frame;
 mod ledger;
 mod outgoing;
-mod parts;
 pub mod server;
 mod splitter;
 mod table;

@@ -8,12 +8,14 @@
 //!
 //! Of data of which only the newest counts one package waits at most: a newer one takes its place.
 
-use super::WAIT_MAX_NS;
 use super::counts::Cause;
 use super::frame::{Carried, HEAD_BYTES, SessionFrameKind, SessionMessage, write_head};
+use super::{EndHost, WAIT_MAX_NS};
+use crate::frame::{FrameKind, NodeIndex, RECORD_PART_HEAD_BYTES};
 use crate::queue::{Place, Queue, QueueShare, QueuedPackage, counts_newest};
+use crate::replication::LINE_PART_ROOM;
 use rohrpost_mailbox::Head;
-use rohrpost_network::LEVELS;
+use rohrpost_network::{LEVELS, LINE_PART_HEADS_BYTES};
 
 /// Bytes that are made ready at a time, at most: what is more important than they are waits for no more. One frame may
 /// exceed it.
@@ -48,7 +50,7 @@ pub(super) trait Fates {
 }
 
 /// What leaves by a connection, or by the next one.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Outgoing {
     ready: Vec<u8>,
     /// Bytes of `ready` that the stream has taken.
@@ -70,19 +72,7 @@ pub(super) struct Outgoing {
 
 impl Outgoing {
     pub(super) fn new(quota_bytes: usize) -> Self {
-        let batch_bytes = BATCH_BYTES;
-        Self {
-            ready: Vec::new(),
-            taken: 0,
-            begun: 0,
-            hurried: 0,
-            sent: 0,
-            queue: None,
-            quota_bytes,
-            batch_bytes,
-            is_part_last: false,
-            empty_looks: 0,
-        }
+        Self { quota_bytes, batch_bytes: BATCH_BYTES, ..Self::default() }
     }
 
     /// Makes this many bytes ready at a time from now on, but no more than [`BATCH_BYTES`].
@@ -303,4 +293,24 @@ fn lose(waiting: &QueuedPackage, body: &[u8], for_others: bool, fates: &mut impl
 
 pub(super) fn is_stale(now_ns: u64, published_ns: u64) -> bool {
     now_ns.saturating_sub(published_ns) > WAIT_MAX_NS
+}
+
+const _: () = assert!(LINE_PART_HEADS_BYTES == HEAD_BYTES + RECORD_PART_HEAD_BYTES, "what `check` reckons with");
+
+/// Makes the next part for a node ready, if the line has room and there is one, and no packages go first: those of its
+/// own party that are as important, and a batch of any after each part. Whether one was made, and whether more wait
+/// behind it: what measures how fast the line is must know.
+pub(super) fn add_part(
+    outgoing: &mut Outgoing,
+    now_ns: u64,
+    (node, party): (NodeIndex, u32),
+    end: &mut impl EndHost,
+) -> (bool, bool) {
+    let Some(replicas) = end.replicas() else { return (false, false) };
+    let is_made = outgoing.add_part((LINE_PART_ROOM, party), |level, content| {
+        let (kind, length) = replicas.next_before(now_ns, (node, level), content)?;
+        let is_record = kind == FrameKind::RecordPart;
+        Some((if is_record { SessionFrameKind::RecordPart } else { SessionFrameKind::Description }, length))
+    });
+    (is_made, replicas.waits_for(now_ns, node))
 }

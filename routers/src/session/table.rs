@@ -16,16 +16,14 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// The ranges of all clients.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct RoutingTable {
     /// By their first name. None has a name in common with another.
     ranges: BTreeMap<Name, Hosted>,
     /// The same, by host.
     of_client: BTreeMap<ClientIndex, Box<[Range]>>,
-    /// How many ranges there are of each system.
-    of_system: [u32; 256],
-    /// Systems of which some names are hosted.
-    systems: Vec<u8>,
+    /// How many ranges there are of each system of which some names are hosted.
+    systems: BTreeMap<u8, u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -48,12 +46,6 @@ pub struct Conflict {
 /// Ranges of all clients together, at most.
 pub const ENTRIES_MAX: usize = 64 * 1024;
 const _: () = assert!(ENTRIES_MAX >= 8 * RANGES_MAX, "one client is far from filling it");
-
-impl Default for RoutingTable {
-    fn default() -> Self {
-        Self { ranges: BTreeMap::new(), of_client: BTreeMap::new(), of_system: [0; 256], systems: Vec::new() }
-    }
-}
 
 impl RoutingTable {
     /// A client hosts these names and no others; all of them or, if it may not, what it hosted before. Ranges that lie
@@ -135,8 +127,8 @@ impl RoutingTable {
     }
 
     /// Systems of which some names are hosted.
-    pub fn systems(&self) -> &[u8] {
-        &self.systems
+    pub fn systems(&self) -> impl Iterator<Item = u8> {
+        self.systems.keys().copied()
     }
 
     /// A range of another client that has names in common with this one.
@@ -147,12 +139,10 @@ impl RoutingTable {
     }
 
     fn count(&mut self, system: u8, change: i32) {
-        let count = &mut self.of_system[usize::from(system)];
+        let count = self.systems.entry(system).or_default();
         *count = count.saturating_add_signed(change);
-        match self.systems.binary_search(&system) {
-            Ok(at) if *count == 0 => drop(self.systems.remove(at)),
-            Err(at) if *count > 0 => self.systems.insert(at, system),
-            _ => {}
+        if *count == 0 {
+            self.systems.remove(&system);
         }
     }
 }

@@ -41,7 +41,7 @@ pub struct ReplicaParts<'a> {
     /// All of the installation.
     pub replicas: &'a [ReplicaSettings],
     /// Reads descriptions.
-    pub describe: Arc<dyn Describe>,
+    pub describe: Arc<Describe>,
     /// The socket, if it is kept for the router; else it makes one.
     pub socket: Option<OwnedFd>,
     /// A bad network between it and its sockets.
@@ -93,7 +93,7 @@ impl Deliver for ReplicaDelivery {
 struct ReplicaTx {
     shared: Arc<Shared>,
     participant: Arc<Participant>,
-    describe: Arc<dyn Describe>,
+    describe: Arc<Describe>,
     driver: ReplicaDriver,
     sender: ReplicaSender,
     sending: Sending<NoPackages>,
@@ -134,7 +134,7 @@ impl ReplicaTx {
 struct StreamFinder {
     shared: Arc<Shared>,
     participant: Arc<Participant>,
-    describe: Arc<dyn Describe>,
+    describe: Arc<Describe>,
     /// The thread of the slots has it, too.
     sender: Arc<Mutex<ReplicaSender>>,
 }

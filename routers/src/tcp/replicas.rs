@@ -10,7 +10,7 @@ pub struct LineParts {
     /// Which.
     pub settings: LineSettings,
     /// Reads descriptions.
-    pub describe: Arc<dyn Describe>,
+    pub describe: Arc<Describe>,
 }
 
 impl LineParts {

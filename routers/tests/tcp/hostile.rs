@@ -3,11 +3,10 @@
 
 use crate::ground::{COMMON, Router, System, address, two, wait};
 use crate::sealed::{Authority, seal};
-use proptest::prelude::Rng;
-use proptest::test_runner::{RngAlgorithm, TestRng};
 use rohrpost_mailbox::{Head, Priority, Type};
 use rohrpost_routers::session::frame::{Carried, Range, Ranges, SessionHello, SessionMessage};
 use rohrpost_routers::tcp::{ClientSeal, LinkState, Moved, ServerSeal, Stream};
+use rohrpost_testbed::sim::chance::Chance;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
@@ -99,22 +98,12 @@ impl Drop for Target {
     }
 }
 
-struct Chance(TestRng);
+fn below(chance: &mut Chance, limit: usize) -> usize {
+    chance.below(limit as u64) as usize
+}
 
-impl Chance {
-    fn new(seed: u8) -> Self {
-        Self(TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32]))
-    }
-
-    fn below(&mut self, limit: usize) -> usize {
-        self.0.next_u32() as usize % limit
-    }
-
-    fn bytes(&mut self, count: usize) -> Vec<u8> {
-        let mut bytes = vec![0; count];
-        self.0.fill_bytes(&mut bytes);
-        bytes
-    }
+fn bytes(chance: &mut Chance, count: usize) -> Vec<u8> {
+    (0..count).map(|_| chance.bits() as u8).collect()
 }
 
 fn hello(incarnation: u64) -> Vec<u8> {
@@ -128,29 +117,26 @@ fn hello(incarnation: u64) -> Vec<u8> {
 /// What a client may say, or nearly.
 fn frames(chance: &mut Chance) -> Vec<u8> {
     let range = |chance: &mut Chance| {
-        let first = u32::from_be_bytes([9, chance.below(256) as u8, chance.below(256) as u8, 0]);
+        let first = u32::from_be_bytes([9, below(chance, 256) as u8, below(chance, 256) as u8, 0]);
         Range { first: rohrpost_mailbox::Name::from_raw(first), last: rohrpost_mailbox::Name::from_raw(first | 255) }
     };
-    let mut bytes = Vec::new();
-    for _ in 0..1 + chance.below(20) {
-        match chance.below(4) {
-            0 => SessionMessage::Ask(chance.below(1 << 30) as u64).write(&mut bytes),
-            1 => {
-                let (ranges, mut laid_out): (Vec<_>, _) =
-                    ((0..chance.below(300)).map(|_| range(chance)).collect(), Vec::new());
-                SessionMessage::Register(Ranges::new(chance.below(9) as u32, &ranges, &mut laid_out)).write(&mut bytes);
-            }
-            2 => {
-                let body = vec![7; chance.below(65_000)];
-                let (to, from) = (range(chance).first, range(chance).first);
-                let (kind, priority) = (Type::command(1 + chance.below(99) as u16), Priority(chance.below(256) as u8));
-                let head = Head { to, from, len: body.len() as u16, kind, priority, ..Head::default() };
-                SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &body }).write(&mut bytes);
-            }
-            _ => bytes.extend(chance.bytes(30)),
+    let frame = |chance: &mut Chance| match below(chance, 4) {
+        0 => SessionMessage::Ask(chance.below(1 << 30)).to_bytes(),
+        1 => {
+            let ranges: Vec<_> = (0..below(chance, 300)).map(|_| range(chance)).collect();
+            let number = below(chance, 9) as u32;
+            SessionMessage::Register(Ranges::new(number, &ranges, &mut Vec::new())).to_bytes()
         }
-    }
-    bytes
+        2 => {
+            let body = vec![7; below(chance, 65_000)];
+            let [to, from] = [(); 2].map(|()| range(chance).first);
+            let (kind, priority) = (Type::command(1 + below(chance, 99) as u16), Priority(chance.bits() as u8));
+            let head = Head { to, from, len: body.len() as u16, kind, priority, ..Head::default() };
+            SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &body }).to_bytes()
+        }
+        _ => bytes(chance, 30),
+    };
+    (0..1 + below(chance, 20)).flat_map(|_| frame(chance)).collect()
 }
 
 /// One attack; what it leaves open.
@@ -160,8 +146,8 @@ fn attack(target: &Target, chance: &mut Chance, number: u64) -> Option<TcpStream
     let stays = match number % 8 {
         // Nothing of ours.
         0 => {
-            let count = 1 + chance.below(3000);
-            write(&chance.bytes(count));
+            let count = 1 + below(chance, 3000);
+            write(&bytes(chance, count));
             false
         }
         // A head that promises much.
@@ -169,9 +155,9 @@ fn attack(target: &Target, chance: &mut Chance, number: u64) -> Option<TcpStream
         // Let in, and then a frame of the largest size that never ends.
         2 => write(&hello(1000 + number)) && write(&[7, 0, 1, 0, 6, 0, 0, 0, 1, 2, 3]),
         // A hello that never ends.
-        3 => write(&hello(7)[..chance.below(40)]),
+        3 => write(&hello(7)[..below(chance, 40)]),
         // A handshake that costs the server all it can.
-        4 if let Some(stranger) = target.stranger.as_ref().filter(|_| chance.below(2) == 0) => {
+        4 if let Some(stranger) = target.stranger.as_ref().filter(|_| below(chance, 2) == 0) => {
             shake_hands(target.address, stranger);
             false
         }
@@ -181,11 +167,11 @@ fn attack(target: &Target, chance: &mut Chance, number: u64) -> Option<TcpStream
         5 | 6 => {
             write(&hello(1000 + number));
             let mut bytes = frames(chance);
-            for _ in 0..chance.below(3) {
-                let at = chance.below(bytes.len());
-                bytes[at] ^= 1 << chance.below(8);
+            for _ in 0..below(chance, 3) {
+                let at = below(chance, bytes.len());
+                bytes[at] ^= 1 << below(chance, 8);
             }
-            let cut = chance.below(bytes.len());
+            let cut = below(chance, bytes.len());
             write(&bytes[..cut]);
             // Sometimes it reads what it is told.
             let _ = stream.read(&mut [0; 512]);
@@ -265,7 +251,7 @@ fn others_are_served(authority: Option<&Authority>) {
             scope.spawn(move || {
                 let (mut chance, mut open) = (Chance::new(seed), Vec::new());
                 while done.fetch_add(1, Ordering::Relaxed) < 8 * attacks() {
-                    let number = chance.below(1 << 20) as u64;
+                    let number = chance.below(1 << 20);
                     open.extend(attack(target, &mut chance, number));
                     // Half open ones are kept, more than it has places.
                     if open.len() > 2 * PLACES as usize {

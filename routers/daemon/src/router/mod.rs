@@ -97,7 +97,7 @@ impl Module for RouterModule {
             None => Shell::start(parts)?,
         };
         if !replicas.is_empty() {
-            let describe = Arc::new(replicas::Descriptions);
+            let describe = Arc::new(replicas::stream_number);
             shell.replicate(&node, ReplicaParts { replicas: &replicas, describe, socket, impair })?;
         }
         context.use_computer_clock();

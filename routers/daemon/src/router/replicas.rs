@@ -5,17 +5,13 @@ use rohrpost_mailbox::Latency;
 use rohrpost_modules::interfaces::{ReplicaCause, ReplicaState, ReplicaStates};
 use rohrpost_modules::schema::Description;
 use rohrpost_routers::frame::NodeIndex;
-use rohrpost_routers::replication::{Describe, ReplicaCounts, ReplicaLoss, ReplicaLosses, ReplicaSettings};
+use rohrpost_routers::replication::{ReplicaCounts, ReplicaLoss, ReplicaLosses, ReplicaSettings};
 use std::time::Duration;
 
 /// Reads descriptions of modules.
-pub(crate) struct Descriptions;
-
-impl Describe for Descriptions {
-    fn number(&self, description: &[u8], item: &str) -> Option<u16> {
-        let description = Description::from_bytes(description).ok()?;
-        description.streams().find(|stream| stream.field.name == item).map(|stream| stream.number)
-    }
+pub(crate) fn stream_number(description: &[u8], item: &str) -> Option<u16> {
+    let description = Description::from_bytes(description).ok()?;
+    description.streams().find(|stream| stream.field.name == item).map(|stream| stream.number)
 }
 
 /// The present state on a node; none if it sends and has no replica. `all` is what `received` has the places of.

@@ -1,6 +1,6 @@
 //! Code that the modules of the TCP router and of its clients share.
 
-use crate::router::replicas::{Descriptions, of};
+use crate::router::replicas::{of, stream_number};
 use rohrpost_config::{Installation, Tcp};
 use rohrpost_mailbox::{Latency, Name, Priority};
 use rohrpost_modules::ModuleError;
@@ -33,7 +33,7 @@ pub(super) fn certificates(installation: &Installation, tcp: &Tcp) -> Option<Pat
 /// The replicas of a node that go by the TCP router, if there are any.
 pub(super) fn line_parts(installation: &Installation, node: &str) -> Option<LineParts> {
     let settings = LineSettings::new(installation, node)?;
-    Some(LineParts { settings, describe: Arc::new(Descriptions) })
+    Some(LineParts { settings, describe: Arc::new(stream_number) })
 }
 
 /// What the TCP router sends to which node, as the file says.

@@ -7,7 +7,7 @@ use crate::harness::{End, MS, START, address, head, module, settings};
 use crate::inbound::{Datagram, Inbound};
 use crate::outbound::Outbound;
 use crate::port::Port;
-use crate::replication::{Describe, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
+use crate::replication::{ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
 use crate::stats::Stats;
 use rohrpost_config::Sampling;
@@ -20,14 +20,6 @@ use std::time::Duration;
 const ID: StreamId = StreamId { name: Name::new(1, 112, 0, 0), number: 2 };
 const SHAPE: StreamShape = StreamShape { record_bytes: 200_000, keep: 8, readers: 2, late: Duration::ZERO };
 const HOLDER: NodeIndex = 1;
-
-struct Always;
-
-impl Describe for Always {
-    fn number(&self, _: &[u8], _: &str) -> Option<u16> {
-        Some(ID.number)
-    }
-}
 
 fn time(ns: u64) -> SystemTime {
     SystemTime { ns, epoch: 1, error: Duration::ZERO, age: Duration::ZERO }
@@ -91,12 +83,12 @@ impl Replicated {
         join(0).describe_replicas(ID.name, b"of a camera").unwrap();
         let writer = join(0).stream_writer(ID, SHAPE).unwrap();
         let mut sender = ReplicaSender::new(&end.settings, std::slice::from_ref(&replica));
-        sender.look(&join(0), &Always);
+        sender.look(&join(0), &|_: &[u8], _: &str| Some(ID.number));
         let stats = Stats::of_port(Port::Replicas, &end.settings, &end.stats);
         let outbound = Outbound::new(&end.settings, stats).behind(&end.stats).only_to(sender.peers());
         let there = settings(HOLDER, 3);
         let inbound = Inbound::new(&there, Stats::of_port(Port::Replicas, &there, &Stats::new(&there, START)));
-        let receiver = ReplicaReceiver::new(&there, &[replica], join(1), Arc::new(Always));
+        let receiver = ReplicaReceiver::new(&there, &[replica], join(1), Arc::new(|_: &[u8], _: &str| Some(ID.number)));
         let holder = Holder { inbound, receiver };
         let reader = join(1).stream_reader(ID).unwrap();
         Self { sender, outbound, writer, holder, reader, interrupted_after: None, _folder: folder }

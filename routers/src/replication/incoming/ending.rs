@@ -1,5 +1,6 @@
 //! How what is open ends: published, or given up.
 
+use super::super::alarms::note_missing;
 use super::super::answer_time::Unanswered;
 use super::super::counts::ReplicaLoss;
 use super::super::gathering::Life;
@@ -74,7 +75,7 @@ impl IncomingReplica {
         counts.bytes.add(record.len_bytes as u64);
         counts.completed.add(was_asked.into());
         (self.life, self.sampled) = (Some(life), Some(arriving.sampled));
-        self.losses.note(now.ns, gap.saturating_sub(sampled.into()), &self.settings);
+        note_missing(&mut self.missing_told, now.ns, gap.saturating_sub(sampled.into()), &self.settings);
         self.delays.note(now.ns, &(now.system)(), &arriving, (&self.settings, counts));
     }
 

@@ -7,7 +7,6 @@ use super::*;
 use crate::frame::{self, Frame, FrameKind};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::collections::BTreeMap;
 
 const US: u64 = 1000;
 /// Ends are looked at this often.
@@ -22,24 +21,22 @@ fn body(sequence: u64, most: usize) -> Vec<u8> {
     body
 }
 
-/// A wire one way: datagrams by the time of their arrival.
-struct Wire {
+/// A wire one way that does harm.
+struct BadWire {
     delay_ns: u64,
     loss: f64,
     rng: ChaCha8Rng,
-    datagrams: BTreeMap<(u64, u64), Vec<u8>>,
-    count: u64,
+    wire: Wire,
 }
 
-impl Wire {
+impl BadWire {
     fn new(seed: u64, loss: f64) -> Self {
-        Self { delay_ns: 300 * US, loss, rng: ChaCha8Rng::seed_from_u64(seed), datagrams: BTreeMap::new(), count: 0 }
+        Self { delay_ns: 300 * US, loss, rng: ChaCha8Rng::seed_from_u64(seed), wire: Wire::default() }
     }
 
     /// Delays, and with that reorders, some; doubles and damages a few, and moves parts of records, as a sender with a
     /// mistake would.
     fn put(&mut self, now_ns: u64, mut datagram: Vec<u8>) {
-        self.count += 1;
         let copies = 1 + u64::from(self.rng.random_bool(self.loss / 5.0));
         for _ in 0..copies {
             if self.rng.random_bool(self.loss) {
@@ -57,13 +54,8 @@ impl Wire {
             }
             let late_ns =
                 if self.loss > 0.0 && self.rng.random_bool(0.05) { self.rng.random_range(0..800 * US) } else { 0 };
-            self.datagrams.insert((now_ns + self.delay_ns + late_ns, self.count), datagram.clone());
+            self.wire.put(now_ns + self.delay_ns + late_ns, datagram.clone());
         }
-    }
-
-    fn take(&mut self, now_ns: u64) -> Option<Vec<u8>> {
-        let first = self.datagrams.first_entry().filter(|first| first.key().0 <= now_ns)?;
-        Some(first.remove())
     }
 }
 
@@ -74,8 +66,8 @@ pub(super) struct Pair {
     pub(super) holder: Holder,
     pub(super) writer: StreamWriter,
     reader: StreamReader,
-    there: Wire,
-    back: Wire,
+    there: BadWire,
+    back: BadWire,
     most: usize,
     /// When each record was written, ns.
     written_ns: Vec<u64>,
@@ -91,18 +83,17 @@ pub(super) struct Pair {
 
 impl Pair {
     pub(super) fn new(replica: ReplicaSettings, seed: u64, [there, back]: [f64; 2]) -> Self {
-        let (shape, replicas) = (replica.shape, [replica]);
-        let (origin, holder) = (Origin::new(&replicas), Holder::new(&replicas));
-        let (writer, reader) = (origin.writer(ID, shape), holder.reader());
+        let most = replica.shape.record_bytes as usize;
+        let Both { origin, holder, writer, reader, now_ns } = Both::new(replica);
         let mut pair = Self {
-            now_ns: START,
+            now_ns,
             origin,
             holder,
             writer,
             reader,
-            there: Wire::new(seed, 0.0),
-            back: Wire::new(seed + 1000, back),
-            most: shape.record_bytes as usize,
+            there: BadWire::new(seed, 0.0),
+            back: BadWire::new(seed + 1000, back),
+            most,
             written_ns: Vec::new(),
             slowest_ns: 0,
             last: None,
@@ -142,7 +133,7 @@ impl Pair {
             assert_eq!(to, HOLDER);
             self.there.put(now_ns, datagram);
         }
-        while let Some(datagram) = self.there.take(now_ns) {
+        while let Some(datagram) = self.there.wire.take(now_ns) {
             self.holder.take(now_ns, &datagram);
         }
         self.holder.pass(now_ns);
@@ -155,7 +146,7 @@ impl Pair {
             self.asked.push(request.read().sequence);
             self.back.put(now_ns, datagram);
         }
-        while let Some(datagram) = self.back.take(now_ns) {
+        while let Some(datagram) = self.back.wire.take(now_ns) {
             self.origin.router.take(now_ns, HOLDER, &datagram);
         }
         self.read();

@@ -1,6 +1,6 @@
 //! By a session: one record leaves, the newest is next, and sampling is as on the LAN.
 
-use super::{CAMERA, FirstByte, Ground, ID, SHAPE, at, image, sequences, time, words};
+use super::{CAMERA, Ground, ID, SHAPE, at, first_byte, image, sequences, time, words};
 use crate::frame::{DescriptionPart, FrameKind, NodeIndex, RecordPart, ReplicaFrame};
 use crate::harness::{MS, START};
 use crate::replication::{LINE_PART_ROOM, LineReplicas, LineSettings, ReplicaLoss, ReplicaSettings};
@@ -16,7 +16,7 @@ const LAPTOP: NodeIndex = 1;
 pub(super) fn end(ground: &Ground, own: NodeIndex, sent: ReplicaSettings, received: ReplicaSettings) -> LineReplicas {
     let (sent, received) = (vec![sent], vec![received]);
     let settings = LineSettings { own, server: SERVER, nodes: Vec::new(), sent, received };
-    LineReplicas::new(&settings, ground.join(), Arc::new(FirstByte), Box::new(time))
+    LineReplicas::new(&settings, ground.join(), Arc::new(first_byte), Box::new(time))
 }
 
 /// The next part arrives, if there is one.

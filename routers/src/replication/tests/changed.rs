@@ -12,15 +12,12 @@ fn changes(sampling: Sampling) -> ReplicaSettings {
 
 /// Sequences that arrive when each of these bodies is written a millisecond after the other, and how many are left out.
 fn arrive(replica: ReplicaSettings, bodies: &[&[u8]]) -> (Vec<u64>, u64) {
-    let replicas = [replica];
-    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-    let (mut writer, mut reader) = (origin.writer(ID, SHAPE), holder.reader());
+    let mut both = Both::new(replica);
     for (step, body) in (0..).zip(bodies) {
-        let mut now_ns = START + step * MS;
-        writer.write(at(100 + step), body).unwrap();
-        holder.take_all(now_ns, &origin.leave(&mut now_ns));
+        both.now_ns = START + step * MS;
+        both.send(100 + step, body);
     }
-    (sequences(&mut reader), origin.lost(ReplicaLoss::Sampled))
+    (sequences(&mut both.reader), both.origin.lost(ReplicaLoss::Sampled))
 }
 
 #[test]
@@ -44,43 +41,33 @@ fn a_record_like_the_last_one_sent_is_left_out() {
 
 #[test]
 fn what_may_not_have_arrived_goes_again() {
-    let replicas = [changes(Sampling::Each)];
-    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-    let (mut now_ns, mut writer) = (START, origin.writer(ID, SHAPE));
-    let mut write = |origin: &mut Origin, holder: &mut Holder, now_ns: &mut u64| {
-        *now_ns += 1;
-        writer.write(at(*now_ns), b"a map").unwrap();
+    let mut both = Both::new(changes(Sampling::Each));
+    let write = |both: &mut Both| {
+        both.now_ns += 1;
         // What it has already is not a record once more.
-        let came = |holder: &Holder| holder.records() + holder.lost(ReplicaLoss::Duplicate);
-        let before = came(holder);
-        holder.take_all(*now_ns, &origin.leave(now_ns));
-        came(holder) - before
+        let came = |both: &Both| both.holder.records() + both.holder.lost(ReplicaLoss::Duplicate);
+        let before = came(both);
+        both.send(both.now_ns, b"a map");
+        came(both) - before
     };
-    let mut arrives = |why: &str, now_ns: &mut u64, records: [u64; 3], change: &dyn Fn(&mut Origin, &mut Holder)| {
-        change(&mut origin, &mut holder);
-        let arrived = [(); 3].map(|()| write(&mut origin, &mut holder, now_ns));
-        assert_eq!(arrived, records, "{why}");
+    let arrives = |both: &mut Both, records: [u64; 3], why: &str| {
+        assert_eq!([(); 3].map(|()| write(both)), records, "{why}");
     };
-    arrives("it is there then", &mut now_ns, [1, 0, 0], &|_, _| {});
-    now_ns += UNCHANGED_EVERY_NS / 2;
-    arrives("nothing has happened", &mut now_ns, [0, 0, 0], &|_, _| {});
-    now_ns += UNCHANGED_EVERY_NS;
-    arrives("it is long ago", &mut now_ns, [1, 0, 0], &|_, _| {});
-    let anew = |origin: &mut Origin, _: &mut Holder| origin.router.stats.peer(HOLDER).link.incarnation.set(5);
-    arrives("its router began anew", &mut now_ns, [1, 0, 0], &anew);
-    let silent_ns = now_ns + 2000 * MS;
-    let away = |origin: &mut Origin, _: &mut Holder| {
-        let Router { sender, outbound, .. } = &mut origin.router;
-        let waits = sender.poll(silent_ns, time, outbound, &mut [0; 1472]);
-        assert!(matches!(waits, ReplicaStep::Idle { .. }), "{waits:?}");
-    };
-    now_ns = silent_ns;
-    arrives("it was silent", &mut now_ns, [1, 0, 0], &away);
-    let described = |origin: &mut Origin, _: &mut Holder| {
-        origin.ground.join().describe_replicas(CAMERA, &words(2)).unwrap();
-        origin.look();
-    };
-    arrives("there is another interface, so its ring is made anew", &mut now_ns, [1, 0, 0], &described);
+    arrives(&mut both, [1, 0, 0], "it is there then");
+    both.now_ns += UNCHANGED_EVERY_NS / 2;
+    arrives(&mut both, [0, 0, 0], "nothing has happened");
+    both.now_ns += UNCHANGED_EVERY_NS;
+    arrives(&mut both, [1, 0, 0], "it is long ago");
+    both.origin.router.stats.peer(HOLDER).link.incarnation.set(5);
+    arrives(&mut both, [1, 0, 0], "its router began anew");
+    both.now_ns += 2000 * MS;
+    let Router { sender, outbound, .. } = &mut both.origin.router;
+    let waits = sender.poll(both.now_ns, time, outbound, &mut [0; 1472]);
+    assert!(matches!(waits, ReplicaStep::Idle { .. }), "{waits:?}");
+    arrives(&mut both, [1, 0, 0], "it was silent");
+    both.origin.ground.join().describe_replicas(CAMERA, &words(2)).unwrap();
+    both.origin.look();
+    arrives(&mut both, [1, 0, 0], "there is another interface, so its ring is made anew");
 }
 
 #[test]

@@ -38,7 +38,7 @@ pub(super) fn attempts() -> usize {
     wanted.map_or(NORMALLY, |wanted| wanted.parse().expect("HOSTILE_DATAGRAMS is a number"))
 }
 
-/// Flips a few bits of a datagram, swaps two stretches, cuts or extends it, or puts its head before the rest of another.
+/// Flips bits of a datagram, swaps two stretches, cuts or extends it, or puts the rest of another behind its head.
 pub(super) fn alter(chance: &mut ChaCha8Rng, datagram: &mut Vec<u8>, other: &[u8]) {
     let len = datagram.len();
     match chance.random_range(0..5) {
@@ -66,9 +66,7 @@ pub(super) fn one_of<'a>(chance: &mut ChaCha8Rng, all: &'a [Vec<u8>]) -> &'a Vec
 
 /// All that two routers say to each other of records of many sizes.
 fn said() -> Vec<Vec<u8>> {
-    let replicas = [image()];
-    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-    let (mut now_ns, mut writer) = (START, origin.writer(ID, SHAPE));
+    let Both { mut origin, mut holder, mut writer, mut now_ns, .. } = Both::new(image());
     let mut all = Vec::new();
     for (step, len) in (0..).zip([0, 1, 700, 1376, 1377, 4000, 6000]) {
         let body: Vec<u8> = (0..len).map(|at| (at * 7 + step as usize) as u8).collect();

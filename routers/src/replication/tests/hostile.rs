@@ -52,12 +52,10 @@ pub(super) fn described() -> Holder {
 }
 
 pub(super) fn described_by(replica: ReplicaSettings) -> Holder {
-    let replicas = [replica];
-    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-    let mut now_ns = START;
-    holder.take_all(now_ns, &origin.leave(&mut now_ns));
-    assert_eq!(holder.ground.node.about(CAMERA), Some(words(1)));
-    holder
+    let mut both = Both::new(replica);
+    both.carry();
+    assert_eq!(both.holder.ground.node.about(CAMERA), Some(words(1)));
+    both.holder
 }
 
 #[test]

@@ -10,38 +10,34 @@ const PART: u8 = FrameKind::RecordPart as u8;
 fn a_node_that_comes_late_has_the_newest_at_once() {
     // Whatever the sampling says of the next one.
     for sampling in [Sampling::Each, Sampling::Every(100), Sampling::Rate(0.1)] {
-        let replicas = [ReplicaSettings { sampling, ..image() }];
-        let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-        let (mut now_ns, mut writer) = (START, origin.writer(ID, SHAPE));
+        let mut both = Both::new(ReplicaSettings { sampling, ..image() });
         for step in 0..5 {
-            writer.write(at(100 + step), b"a map").unwrap();
-            origin.leave(&mut now_ns);
+            both.writer.write(at(100 + step), b"a map").unwrap();
+            both.origin.leave(&mut both.now_ns);
         }
         // Its router is heard for the first time.
-        origin.router.stats.peer(HOLDER).link.incarnation.set(5);
-        holder.take_all(now_ns, &origin.leave(&mut now_ns));
-        let there = holder.ground.node.inspect_stream(ID).unwrap();
+        both.origin.router.stats.peer(HOLDER).link.incarnation.set(5);
+        both.carry();
+        let there = both.holder.ground.node.inspect_stream(ID).unwrap();
         let newest = there.and_then(|there| there.newest).map(|newest| newest.sequence);
         assert_eq!(newest, Some(4), "{sampling}");
         // And again: what it has already is no gap, and not a second record.
-        origin.router.stats.peer(HOLDER).link.incarnation.set(6);
-        holder.take_all(now_ns, &origin.leave(&mut now_ns));
-        assert_eq!((holder.records(), holder.lost(ReplicaLoss::Duplicate)), (1, 1), "{sampling}");
+        both.origin.router.stats.peer(HOLDER).link.incarnation.set(6);
+        both.carry();
+        assert_eq!((both.holder.records(), both.holder.lost(ReplicaLoss::Duplicate)), (1, 1), "{sampling}");
     }
 }
 
 #[test]
 fn what_is_under_way_to_a_node_that_begins_anew_goes_from_its_first_part_on() {
-    let replicas = [image()];
-    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-    let (mut now_ns, mut writer, mut reader) = (START, origin.writer(ID, SHAPE), holder.reader());
-    origin.leave(&mut now_ns);
-    writer.write(at(100), &[7; 6000]).unwrap();
-    assert!(origin.router.poll(now_ns + MS).is_ok());
-    writer.write(at(101), b"newer").unwrap();
-    origin.router.stats.peer(HOLDER).link.incarnation.set(5);
-    holder.take_all(now_ns, &origin.leave(&mut now_ns));
-    assert_eq!(read(&mut reader), (vec![(0, 6000), (1, 5)], 0));
+    let mut both = Both::new(image());
+    both.origin.leave(&mut both.now_ns);
+    both.writer.write(at(100), &[7; 6000]).unwrap();
+    assert!(both.origin.router.poll(both.now_ns + MS).is_ok());
+    both.writer.write(at(101), b"newer").unwrap();
+    both.origin.router.stats.peer(HOLDER).link.incarnation.set(5);
+    both.carry();
+    assert_eq!(both.read(), (vec![(0, 6000), (1, 5)], 0));
 }
 
 #[test]

@@ -56,10 +56,9 @@ struct World {
 impl World {
     fn new(seed: u64) -> Self {
         let replicas = [image()];
-        let (origin, holder) = (Origin::new(&replicas), Holder::new(&replicas));
-        let (writer, reader) = (Some(origin.writer(ID, SHAPE)), holder.reader());
-        let rng = ChaCha8Rng::seed_from_u64(seed);
-        let (now_ns, wire, back) = (START, VecDeque::new(), VecDeque::new());
+        let Both { origin, holder, writer, reader, now_ns } = Both::new(image());
+        let (rng, writer) = (ChaCha8Rng::seed_from_u64(seed), Some(writer));
+        let (wire, back) = (VecDeque::new(), VecDeque::new());
         let (incarnation, life, last, read) = (200, 1, None, 0);
         Self { rng, now_ns, replicas, origin, holder, writer, reader, wire, back, incarnation, life, last, read }
     }

@@ -5,7 +5,6 @@ use super::stepped::Lines;
 use super::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::collections::BTreeMap;
 
 const S: u64 = 1_000_000_000;
 /// From one pose to the next, ns.
@@ -14,21 +13,6 @@ const EVERY_NS: u64 = 10 * MS;
 const VARIES_NS: u64 = 18 * MS;
 /// Both ends look so often.
 const LOOK_NS: u64 = MS / 2;
-
-/// A wire: what arrives when, in the order of the arrivals.
-#[derive(Default)]
-struct Wire(BTreeMap<(u64, u64), Vec<u8>>, u64);
-
-impl Wire {
-    fn put(&mut self, arrives_ns: u64, datagram: Vec<u8>) {
-        self.1 += 1;
-        self.0.insert((arrives_ns, self.1), datagram);
-    }
-
-    fn take(&mut self, now_ns: u64) -> Option<Vec<u8>> {
-        self.0.first_entry().filter(|first| first.key().0 <= now_ns).map(|first| first.remove())
-    }
-}
 
 /// What came of poses that were written for a while.
 struct Outcome {
@@ -46,14 +30,12 @@ fn poses(seconds: u64, loss: f64) -> Outcome {
 
 /// The same in rings of this shape.
 fn poses_in(shape: StreamShape, seconds: u64, loss: f64) -> Outcome {
-    let replicas = [ReplicaSettings { shape, ..image() }];
-    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-    let (mut writer, mut reader) = (origin.writer(ID, shape), holder.reader());
+    let mut both = Both::new(ReplicaSettings { shape, ..image() });
+    both.carry();
+    let Both { mut origin, mut holder, mut writer, mut reader, mut now_ns } = both;
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let (mut there, mut back) = (Wire::default(), Wire::default());
-    let (mut now_ns, mut last, mut worst_ns) = (START, None, 0);
-    holder.take_all(now_ns, &origin.leave(&mut now_ns));
-    let begin_ns = now_ns;
+    let (mut last, mut worst_ns, begin_ns) = (None, 0, now_ns);
     let lines = Lines::default();
     tracing::subscriber::with_default(lines.clone(), || {
         // At the end the last ones arrive.

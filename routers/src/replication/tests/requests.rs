@@ -154,9 +154,7 @@ fn what_has_not_left_yet_is_not_sent_twice() {
 
 #[test]
 fn no_request_does_harm() {
-    let replicas = [image()];
-    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-    let (mut writer, mut reader, mut now_ns) = (origin.writer(ID, SHAPE), holder.reader(), START);
+    let mut both = Both::new(image());
     let mut rng = ChaCha8Rng::seed_from_u64(22);
     for step in 0..2000_u64 {
         for _ in 0..rng.random_range(0..6) {
@@ -177,12 +175,12 @@ fn no_request_does_harm() {
                 parts,
             };
             let from = rng.random_range(1..3);
-            let _ = ask(&mut origin, from, request);
+            let _ = ask(&mut both.origin, from, request);
         }
-        writer.write(at(100 + step), &[step as u8; 6000]).unwrap();
-        holder.take_all(now_ns, &origin.leave(&mut now_ns));
-        assert_eq!(read(&mut reader), (vec![(step, 6000)], 0), "each record comes at once");
+        both.send(100 + step, &[step as u8; 6000]);
+        assert_eq!(both.read(), (vec![(step, 6000)], 0), "each record comes at once");
     }
+    let origin = both.origin;
     assert!(again(&origin) < 2000 * (5 + 8), "{}", again(&origin));
     let causes = [ReplicaLoss::NotSent, ReplicaLoss::OutOfRange];
     assert!(causes.iter().all(|cause| origin.lost(*cause) > 50), "{:?}", causes.map(|cause| origin.lost(cause)));

@@ -67,7 +67,7 @@ impl SealedOrigin {
         let ground = Ground::new();
         ground.join().describe_replicas(CAMERA, &words(1)).unwrap();
         let mut sender = ReplicaSender::new(&end.settings, replicas);
-        sender.look(&ground.join(), &FirstByte);
+        sender.look(&ground.join(), &first_byte);
         let outbound = Outbound::new(&end.settings, end.stats.clone()).only_to(1 << HOLDER).sealed(end.all.clone());
         let sealing = Sealing::new(&end.all, Port::Replicas);
         Self { outbound, sender, sealing, ground, end }
@@ -112,7 +112,7 @@ struct SealedHolder {
 
 impl SealedHolder {
     fn new(end: End, replicas: &[ReplicaSettings], ground: Ground) -> Self {
-        let receiver = ReplicaReceiver::new(&end.settings, replicas, ground.join(), Arc::new(FirstByte));
+        let receiver = ReplicaReceiver::new(&end.settings, replicas, ground.join(), Arc::new(first_byte));
         let inbound = Inbound::new(&end.settings, end.stats.clone());
         Self { gate: Gate::without_hellos(&end.all, Port::Replicas), inbound, receiver, ground, end }
     }

@@ -23,11 +23,9 @@ fn an_answer_that_takes_longer_than_was_waited_is_learned() {
 /// With time slots parts come a few in each cycle. One is lost, and no request gets through before the last has come.
 #[test]
 fn a_record_that_comes_in_many_slots_is_not_given_up_meanwhile() {
-    let replicas = [pictures()];
-    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
-    let (mut now_ns, mut reader) = (START, holder.reader());
-    let mut writer = origin.writer(ID, replicas[0].shape);
-    holder.take_all(now_ns, &origin.leave(&mut now_ns));
+    let mut both = Both::new(pictures());
+    both.carry();
+    let Both { mut origin, mut holder, mut writer, mut reader, mut now_ns } = both;
     let bytes: Vec<u8> = (0..60_000).map(|at| (at / 7) as u8).collect();
     writer.write(at(now_ns), &bytes).unwrap();
     let parts = origin.leave(&mut now_ns);

@@ -8,8 +8,7 @@ use crate::session::WAIT_MAX_NS;
 use crate::session::counts::Cause;
 use crate::session::frame::{Carried, Ranges, SessionMessage};
 use crate::session::ledger::Ledger;
-use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
-use crate::session::parts::add_part;
+use crate::session::outgoing::{Fates, Outgoing, Parcel, add_part, is_stale};
 use rohrpost_mailbox::{Name, Priority};
 
 impl Client {

@@ -55,7 +55,7 @@ impl Server {
         let Some((own, reaches_own)) = self.member(from).map(|member| (member.system, member.reaches_own)) else {
             return;
         };
-        let systems: Vec<u8> = self.table.systems().to_vec();
+        let systems: Vec<u8> = self.table.systems().collect();
         // A client that hosts the name in its own system knows whether a receiver is there: that is counted at its end.
         let mut is_reached = false;
         for system in systems {
@@ -143,7 +143,7 @@ impl Server {
     ) {
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return };
         let Member { outgoing, name, .. } = &mut **member;
-        let mut ledger = Ledger::new(&self.counts, &mut *host, Some(name)).by_principal(&mut self.places.principals);
+        let mut ledger = Ledger::new(&self.counts, &mut *host, Some((name, &mut self.places.principals)));
         work(outgoing, &mut ledger);
         let answers = ledger.into_answers();
         self.say_all(now_ns, answers, host);

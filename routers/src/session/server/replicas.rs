@@ -4,7 +4,7 @@
 use super::{Server, ServerHost};
 use crate::frame::ReplicaFrame;
 use crate::session::ClientIndex;
-use crate::session::parts::add_part;
+use crate::session::outgoing::add_part;
 
 impl Server {
     /// Clients for which a record waits have something to do.

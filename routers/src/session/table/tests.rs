@@ -37,11 +37,11 @@ fn a_name_is_hosted_by_the_range_that_it_lies_in() {
     ] {
         assert_eq!(table.client_of(name), client, "{name}: {why}");
     }
-    assert_eq!(table.systems(), [1, 2]);
+    assert!(table.systems().eq([1, 2]));
     table.remove(brain);
-    assert_eq!((table.client_of(Name::new(1, 199, 0, 0)), table.systems()), (None, &[1, 2][..]));
+    assert!(table.client_of(Name::new(1, 199, 0, 0)).is_none() && table.systems().eq([1, 2]));
     table.remove(arm);
-    assert_eq!((table.systems(), table.len()), (&[2][..], 1));
+    assert!(table.systems().eq([2]) && table.len() == 1);
 }
 
 #[test]
@@ -135,7 +135,7 @@ proptest! {
             let mut sorted = model.clone();
             sorted.sort_by_key(|(_, range)| range.first);
             prop_assert_eq!(hosted(&table), sorted);
-            prop_assert_eq!(table.systems(), if model.is_empty() { &[][..] } else { &[1][..] });
+            prop_assert!(table.systems().eq((!model.is_empty()).then_some(1)));
         }
         let name = Name::new(1, asked, 3, 3);
         let found = model.iter().find(|(_, range)| range.has(name)).map(|(client, _)| *client);

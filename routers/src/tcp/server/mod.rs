@@ -326,22 +326,17 @@ impl ServerThread {
         };
         let members: Vec<_> = self.server.snapshots(now_ns).take(MEMBERS_MAX).map(member).collect();
         let more = (self.server.clients().count() - members.len()) as u64;
-        let classes = Class::all(self.server.counts());
-        let ServerReporter { left, refused, ref refusal, .. } = self.host;
-        let (refusal, held) = (refusal.clone(), self.host.held());
-        let (crowded, superseded) = (self.server.crowded(), self.server.superseded());
-        let crowded_packages = self.server.counts().lost_for(Cause::Share);
         self.shared.seen.say(Members {
             members,
             more,
-            left,
-            refused,
-            refusal,
-            crowded,
-            crowded_packages,
-            superseded,
-            held,
-            classes,
+            left: self.host.left,
+            refused: self.host.refused,
+            refusal: self.host.refusal.clone(),
+            crowded: self.server.crowded(),
+            crowded_packages: self.server.counts().lost_for(Cause::Share),
+            superseded: self.server.superseded(),
+            held: self.host.throttle.held,
+            classes: Class::all(self.server.counts()),
         });
     }
 }

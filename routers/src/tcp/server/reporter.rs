@@ -11,7 +11,7 @@ use rohrpost_mailbox::monotonic_ns;
 /// Reports events, and answers for receivers that are not reached.
 pub(super) struct ServerReporter {
     fault_writer: FaultWriter,
-    throttle: LineThrottle,
+    pub(super) throttle: LineThrottle,
     /// Clients that took part and do not any more.
     pub(super) left: u64,
     /// Connections that might not take part.
@@ -46,11 +46,6 @@ impl ServerReporter {
         while let Some((topic, line)) = self.throttle.next_held(now_ns) {
             tell(topic, &line);
         }
-    }
-
-    /// Lines held back so far.
-    pub(super) fn held(&self) -> u64 {
-        self.throttle.held
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{MS, World};
 use crate::frame::NodeIndex;
-use crate::replication::{Describe, LineReplicas, LineSettings, ReplicaSettings};
+use crate::replication::{LineReplicas, LineSettings, ReplicaSettings};
 use crate::session::frame::{HEAD_BYTES, LENGTH_MAX, SessionFrameHead, SessionMessage};
 use crate::session::tests::oracle::SessionOracle;
 use crate::session::tests::plan::module;
@@ -28,14 +28,6 @@ pub(in crate::session::tests) const PICTURE: usize = 0;
 pub(in crate::session::tests) const POSE: usize = 1;
 /// It is written on the node of a client.
 pub(in crate::session::tests) const BACK: usize = 2;
-
-struct Always;
-
-impl Describe for Always {
-    fn number(&self, _: &[u8], _: &str) -> Option<u16> {
-        Some(NUMBER)
-    }
-}
 
 fn shape(place: usize) -> StreamShape {
     let (_, record_bytes, keep, ..) = STREAMS[place];
@@ -112,7 +104,12 @@ pub(in crate::session::tests) struct Rings {
 
 fn line(node: &Arc<Node>, settings: &LineSettings) -> LineReplicas {
     let time = |ns| SystemTime { ns, epoch: 1, error: Duration::from_micros(10), age: Duration::ZERO };
-    LineReplicas::new(settings, Participant::join(node, Name::NONE).unwrap(), Arc::new(Always), Box::new(time))
+    LineReplicas::new(
+        settings,
+        Participant::join(node, Name::NONE).unwrap(),
+        Arc::new(|_: &[u8], _: &str| Some(NUMBER)),
+        Box::new(time),
+    )
 }
 
 impl Rings {

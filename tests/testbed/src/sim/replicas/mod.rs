@@ -31,7 +31,7 @@ use super::clock::Now;
 use super::station::Io;
 use accounts::Accounts;
 use leaving::Leaving;
-use rings::Interfaces;
+use rings::stream_number;
 use rohrpost_mailbox::{Participant, SystemTime, TimeRecord};
 use rohrpost_routers::driver::{RxDriver, part_for_slot, part_queue};
 use rohrpost_routers::frame::NodeIndex;
@@ -67,7 +67,7 @@ impl Replicas {
     ) -> Self {
         let node = usize::from(settings.own);
         let mut sender = ReplicaSender::new(settings, rings.replicas());
-        let receiver = ReplicaReceiver::new(settings, rings.replicas(), rings.join(node), Arc::new(Interfaces));
+        let receiver = ReplicaReceiver::new(settings, rings.replicas(), rings.join(node), Arc::new(stream_number));
         let receiver = receiver.asking_by(sender.requests());
         let stats = Stats::of_port(RouterPort::Replicas, settings, all);
         let gate = peer_sessions.map(|all| Gate::without_hellos(all, RouterPort::Replicas));
@@ -90,7 +90,7 @@ impl Replicas {
     fn look(&mut self, io: &mut Io<'_>) {
         if io.now.monotonic_ns >= self.look_ns {
             self.look_ns = io.now.monotonic_ns + LOOK_EVERY_NS;
-            self.sender.look(&self.participant, &Interfaces);
+            self.sender.look(&self.participant, &stream_number);
         }
     }
 

@@ -4,7 +4,7 @@ use super::stream::StreamPlan;
 use crate::sim::plan::Plan;
 use rohrpost_mailbox::{Name, Node, Participant, StreamId};
 use rohrpost_routers::frame::NodeIndex;
-use rohrpost_routers::replication::{Describe, ReplicaSettings};
+use rohrpost_routers::replication::ReplicaSettings;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::Path;
@@ -97,12 +97,8 @@ pub(super) fn words(module: Name, edition: u32) -> Vec<u8> {
 }
 
 /// Reads such words.
-pub(super) struct Interfaces;
-
-impl Describe for Interfaces {
-    fn number(&self, description: &[u8], name: &str) -> Option<u16> {
-        let number = |at: usize| Some(u32::from_le_bytes(*description.get(at..)?.first_chunk()?));
-        let expected = words(Name::from_raw(number(0)?), number(4)?);
-        (description == expected).then(|| name.strip_prefix('s')?.parse().ok()).flatten()
-    }
+pub(super) fn stream_number(description: &[u8], name: &str) -> Option<u16> {
+    let number = |at: usize| Some(u32::from_le_bytes(*description.get(at..)?.first_chunk()?));
+    let expected = words(Name::from_raw(number(0)?), number(4)?);
+    (description == expected).then(|| name.strip_prefix('s')?.parse().ok()).flatten()
 }
