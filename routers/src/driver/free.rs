@@ -10,7 +10,7 @@
 use super::outlet::{Outlet, Transmitter};
 use crate::outbound::Package;
 use crate::settings::Settings;
-use rohrpost_mailbox::{Head, Priority};
+use rohrpost_mailbox::Priority;
 use std::sync::Arc;
 
 /// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
@@ -26,20 +26,6 @@ pub trait Inlet {
     fn first(&mut self) -> Option<Priority>;
     /// Lends out the most important package, with what looks whether it is alone in the mailbox. None: there is none.
     fn take<T>(&mut self, what: impl FnOnce(&mut Self::Outlet, &Package<'_>, &dyn Fn() -> bool) -> T) -> Option<T>;
-}
-
-/// The way to the thread that sends what is not real time.
-pub trait Handover {
-    /// Whether it takes a package.
-    fn takes(&mut self) -> bool;
-    /// Hands a package over; only if it takes one.
-    fn give(&mut self, head: &Head, published_ns: u64, body: &[u8]);
-    /// No more packages for the moment.
-    fn finish(&mut self);
-    /// Whether it might take.
-    fn has_room(&self) -> bool;
-    /// From now on this thread is woken when it may take again.
-    fn wants_room(&self);
 }
 
 /// What to do until it is polled again.

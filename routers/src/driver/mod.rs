@@ -32,11 +32,11 @@ mod timing;
 
 pub use answer::{ANSWER_BYTES, ANSWERS, Answer};
 pub use clock::{ClockDriver, ClockStep, TimeStart};
-pub use free::{FreeDriver, FreeStep, Handover, Inlet, Wakes};
+pub use free::{FreeDriver, FreeStep, Inlet, Wakes};
 pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};
 pub(crate) use outlet::Transmitter;
-pub use outlet::{Outlet, OutletStep};
+pub use outlet::{Handover, Outlet, OutletStep};
 pub use parts::part_for_slot;
 pub use platform::{NotSent, Platform, SlotEvent};
 pub use replicas::{ReplicaDriver, part_queue};

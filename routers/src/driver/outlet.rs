@@ -1,13 +1,26 @@
 //! What a thread that sends as packages come has of the system behind its queue, and what it does with that.
 
-use super::free::Handover;
 use super::platform::NotSent;
 use crate::frame::NodeIndex;
 use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, OutboundStep, Package};
 use crate::replication::{ReplicaSender, ReplicaStep};
 use crate::report::Report;
 use crate::settings::Settings;
-use rohrpost_mailbox::SystemTime;
+use rohrpost_mailbox::{Head, SystemTime};
+
+/// The way to the thread that sends what is not real time.
+pub trait Handover {
+    /// Whether it takes a package.
+    fn takes(&mut self) -> bool;
+    /// Hands a package over; only if it takes one.
+    fn give(&mut self, head: &Head, published_ns: u64, body: &[u8]);
+    /// No more packages for the moment.
+    fn finish(&mut self);
+    /// Whether it might take.
+    fn has_room(&self) -> bool;
+    /// From now on this thread is woken when it may take again.
+    fn wants_room(&self);
+}
 
 /// Clock, queue and sockets of such a thread.
 pub trait Outlet {
