@@ -1,11 +1,11 @@
 //! The TCP router's part of `rohrpost net`: the clients of all nodes as they report themselves, and the server's own
 //! view.
 
-use super::node_report::NodeReport;
+use super::NodeReport;
 use crate::look::summary::class_name;
 use crate::look::target::Running;
 use crate::nodes::quantities::{cells, counted, heads};
-use crate::nodes::slots::lost;
+use crate::nodes::tables::lost;
 use crate::terminal::table::{table_of, time};
 use rohrpost::Class;
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondLink, BeyondState, ClassPassed};

@@ -1,8 +1,7 @@
 //! `rohrpost param`: settings of modules that change at run time.
 
 mod save;
-mod set;
-mod show;
+mod values;
 
 use crate::look::observer::Tool;
 use crate::look::target::{Running, Target};
@@ -110,19 +109,19 @@ struct Load {
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.action {
         ParamCommand::List(list) => {
-            at_work(&list.common, |session| show::list(session, list.name.as_deref(), list.json))
+            at_work(&list.common, |session| values::list(session, list.name.as_deref(), list.json))
         }
         ParamCommand::Get(get) => {
-            at_work(&get.common, |session| show::get(session, &get.name, get.parameter.as_deref(), get.json))
+            at_work(&get.common, |session| values::get(session, &get.name, get.parameter.as_deref(), get.json))
         }
         ParamCommand::Set(set) => {
-            at_work(&set.common, |session| set::run(session, &set.name, &set.parameter, &set.value))
+            at_work(&set.common, |session| values::set_one(session, &set.name, &set.parameter, &set.value))
         }
         ParamCommand::Save(save) => {
             at_work(&save.common, |session| save::run(session, &save.names, save.output.as_deref()))
         }
         ParamCommand::Load(load) => {
-            at_work(&load.common, |session| set::load_file(session, load.file.as_deref(), load.dry_run))
+            at_work(&load.common, |session| values::load_file(session, load.file.as_deref(), load.dry_run))
         }
     }
 }
