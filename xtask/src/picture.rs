@@ -3,7 +3,7 @@
 //! The viewer runs headless with a software renderer, a folder of its own for its state, and a free port. It is
 //! asked for the picture only after a while: first it loads, and shows notices over the views.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::venv::{self, Venv};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};

@@ -2,11 +2,12 @@
 
 use super::account::{self, Balance};
 use super::arguments::{Arguments, GuiConnection};
+use super::asked::{FIRST_FUNCTION, map_line, running};
 use super::gui::{drawing, drawn};
 use super::losses::ExchangeLosses;
 use super::replicas::RecordBalance;
 use super::takeover::{TakeoverRecord, Victim, Watch};
-use super::{FIRST_FUNCTION, beyond, copy, map_line, running};
+use super::{beyond, copy};
 use crate::launch::{LaunchedNodes, lab};
 use crate::look::newest;
 use crate::look::summary::print_classes;

@@ -1,7 +1,7 @@
 //! The kernel and the processor: what may delay a thread.
 
+use super::finding::{Check, Finding};
 use super::machine::Machine;
-use super::{Check, Finding};
 use crate::daemons::{self, Daemon};
 
 /// The first version with open-file-description locks.

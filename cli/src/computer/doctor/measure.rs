@@ -1,6 +1,6 @@
 //! How late a thread wakes up: for one second it sleeps until each full millisecond.
 
-use super::{Check, Finding};
+use super::finding::{Check, Finding};
 use crate::terminal::table::time;
 use rohrpost_mailbox::sys::{self, Scheduling};
 use std::time::{Duration, Instant};

@@ -1,7 +1,7 @@
 //! The directory where a node would be created, its limits, and what exists there already.
 
+use super::finding::{Check, Finding};
 use super::machine::{Bridge, Machine, Needs, NodeDirectory, StreamsFound};
-use super::{Check, Finding};
 use crate::terminal::units::{date, size};
 use rohrpost_modules::runtime::clock_was_set;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! The rights of this user and this process.
 
+use super::finding::{Check, Finding};
 use super::machine::{Limit, Machine, Needs};
-use super::{Check, Finding};
 use crate::terminal::units::size;
 use rohrpost_config::FIFO_MAX;
 

@@ -1,7 +1,7 @@
 //! What protects packages that leave this computer: what the configuration says, and whether its files are here.
 
+use super::finding::{Check, Finding};
 use super::machine::{Machine, Needs};
-use super::{Check, Finding};
 use crate::nodes::keys::certificates;
 use rohrpost_config::{Installation, Keys};
 use rohrpost_network::Security;

@@ -1,7 +1,7 @@
 //! The TCP router's part of `rohrpost net`: the clients of all nodes as they report themselves, and the server's own
 //! view.
 
-use super::NodeReport;
+use super::node_report::NodeReport;
 use crate::look::summary::class_name;
 use crate::look::target::Running;
 use crate::nodes::quantities::{cells, counted, heads};

@@ -1,7 +1,7 @@
 //! The output of `rohrpost net` for people.
 
-use super::NodeReport;
 use super::beyond;
+use super::node_report::NodeReport;
 use crate::look::target::Running;
 use crate::nodes::quantities::counted;
 use crate::nodes::tables::{self, by_class, kept};

@@ -1,7 +1,7 @@
 //! Lines of output from recordings: always the one that arrived first of those that are next in their files.
 
 use super::arguments::{Arguments, Filter};
-use super::{Show, keep_last};
+use super::show::{Show, keep_last};
 use crate::look::{parse_name, unknown_module};
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;

@@ -1,6 +1,6 @@
 //! `param list`, `get`, `set` and `load`.
 
-use super::{Session, find, no_parameters};
+use super::session::{Session, find, no_parameters};
 use crate::terminal::table::table;
 use crate::terminal::{Failure, complain, say};
 use rohrpost::Name;

@@ -4,8 +4,8 @@ mod ask;
 
 pub(super) use ask::ask;
 
+use super::finding::{Check, Finding};
 use super::machine::{Machine, Needs};
-use super::{Check, Finding};
 use std::net::IpAddr;
 
 /// The receive buffer that a router requests, for datagrams that arrive while it does not read.
