@@ -33,7 +33,7 @@ use measure::{bw, delay, graph, hz, mailbox, ping, send, stream};
 use nodes::{keys, net, time};
 use running::{call, control, echo, list, log, param, status, top};
 use std::process::ExitCode;
-use terminal::{complain, help, signed};
+use terminal::{complain, parser};
 
 /// Prioritised mailboxes for robots: configure, launch, inspect, call.
 #[derive(Parser)]
@@ -124,8 +124,8 @@ enum Command {
 
 fn main() -> ExitCode {
     completions::answer(Arguments::command);
-    let command = help::grouped(Arguments::command());
-    let words = signed::options_first(&command, std::env::args_os());
+    let command = parser::grouped(Arguments::command());
+    let words = parser::options_first(&command, std::env::args_os());
     let matches = command.get_matches_from(words);
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match arguments.command {

@@ -10,9 +10,9 @@
 //! ends the build as soon as it has another parent: the demo has ended, however that came. It prints nothing into the
 //! demo's terminal. All goes to a file, the last line of which says how far it is; the demo shows that line.
 
-use crate::Failure;
 use crate::cargo::{self, BRIDGE};
 use crate::crates::{self, Added, Crates, JSON};
+use crate::failure::Failure;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, parent_id};
@@ -111,8 +111,8 @@ fn answer(word: &str) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Behind all else that wants to run: with the least niceness, and where `chrt` is installed, in the scheduling class for
-/// idle processors. It says what it does, whatever the user's settings are: that is read here.
+/// Behind all else that wants to run: with the least niceness, and where `chrt` is installed, in the scheduling class
+/// for idle processors. It says what it does, whatever the user's settings are: that is read here.
 fn build_command() -> Command {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let has_chrt = std::env::split_paths(&path).any(|folder| folder.join("chrt").exists());

@@ -1,7 +1,7 @@
 //! `cargo xtask c-client`: the library for C and C++, installed where their compilers look.
 
-use crate::Failure;
 use crate::cargo;
+use crate::failure::Failure;
 use std::path::Path;
 use std::process::ExitCode;
 

@@ -1,6 +1,6 @@
 //! Paths, and calls of other programs.
 
-use crate::Failure;
+use crate::failure::Failure;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
@@ -36,7 +36,7 @@ pub(crate) fn cargo(args: &[&str]) -> Command {
     cargo_behind(&[], args)
 }
 
-/// The same call behind the words of another program that runs it.
+/// A call of Cargo behind the words of another program that runs it.
 pub(crate) fn cargo_behind(before: &[&str], args: &[&str]) -> Command {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut words = before.iter().map(OsString::from).chain([cargo]);

@@ -6,8 +6,8 @@
 //! that run only if they are named. They find these programs by environment variables, and have to fail without them,
 //! saying `run them by "cargo xtask test --all"`.
 
-use crate::Failure;
 use crate::cargo::{self, BRIDGE, cargo, checked};
+use crate::failure::Failure;
 use crate::parts;
 use crate::report;
 use crate::stages::{self, Done, Stage};

@@ -1,8 +1,8 @@
 //! How far a build is: the crates that are there, of all that it needs. Minutes are told nowhere: they depend on the
 //! computer, and on what else it does.
 
-use crate::Failure;
 use crate::cargo;
+use crate::failure::Failure;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::io::{BufRead, BufReader, IsTerminal};

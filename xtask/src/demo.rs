@@ -1,9 +1,9 @@
 //! `cargo demo`: from a fresh clone to a robot on the screen.
 
-use crate::Failure;
 use crate::beside::{self, Begun};
 use crate::cargo::{self, BRIDGE};
 use crate::crates;
+use crate::failure::Failure;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 

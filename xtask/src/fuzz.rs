@@ -4,8 +4,8 @@
 //! Inputs with new coverage are kept below `target/fuzz/found`, as a start for longer runs. An input that breaks a
 //! promise is a file in `target/fuzz`, and goes into `tests/fuzz/corpus` once the mistake is fixed.
 
-use crate::Failure;
 use crate::cargo::{self, cargo, host};
+use crate::failure::Failure;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};

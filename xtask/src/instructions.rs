@@ -3,8 +3,8 @@
 //! Counts need no quiet machine: the same compiler makes the same instructions. So a commit that makes a path slower
 //! fails without a clock. What they do not see: cache lines that move between processors, and the kernel.
 
-use crate::Failure;
 use crate::cargo::{self, cargo, host};
+use crate::failure::Failure;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};

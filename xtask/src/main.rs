@@ -10,6 +10,7 @@ mod cargo;
 mod checks;
 mod crates;
 mod demo;
+mod failure;
 mod fuzz;
 mod instructions;
 mod parts;
@@ -20,9 +21,6 @@ mod tsan;
 mod venv;
 
 use std::process::ExitCode;
-
-/// A failure for the user: the error, and what to do.
-type Failure = String;
 
 const HELP: &str = "\
 cargo demo [--no-gui] [ARGS...]   the same as `cargo xtask demo`

@@ -1,11 +1,11 @@
-//! How long each test program of a `cargo test` takes, from what Cargo says on the way, and what it costs: processor time
-//! of user and kernel, also on a machine that does other things.
+//! How long each test program of a `cargo test` takes, from what Cargo says on the way, and what it costs: processor
+//! time of user and kernel, also on a machine that does other things.
 //!
-//! The kernel adds a process's time to that of its parent when the parent waits for it. So what a stage has left running,
-//! and what ended without a parent that waits, is not counted.
+//! The kernel adds a process's time to that of its parent when the parent waits for it. So what a stage has left
+//! running, and what ended without a parent that waits, is not counted.
 
-use crate::Failure;
 use crate::cargo;
+use crate::failure::Failure;
 use std::io::{self, BufRead, BufReader, PipeReader, Write};
 use std::iter::Sum;
 use std::process::{Command, ExitStatus, Stdio};

@@ -3,7 +3,7 @@
 //! The viewer runs headless with a software renderer, a folder of its own for its state, and a free port. It is
 //! asked for the picture only after a while: first it loads, and shows notices over the views.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::venv::{self, Venv};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -73,7 +73,9 @@ fn renderer() -> Result<(), Failure> {
 }
 
 fn viewer(venv: &Venv, order: &Order, memory: &Path) -> Result<(Child, u16), Failure> {
-    let port = free_port().map_err(|error| format!("no free port for the viewer: {error}"))?;
+    let address = TcpListener::bind("127.0.0.1:0").and_then(|socket| socket.local_addr());
+    let port =
+        address.map(|address| address.port()).map_err(|error| format!("no free port for the viewer: {error}"))?;
     let child = Command::new(&venv.rerun)
         .args(["--headless", "--bind", "127.0.0.1", "--renderer", "vulkan"])
         .args(["--port", &port.to_string(), "--window-size", &order.size])
@@ -84,10 +86,6 @@ fn viewer(venv: &Venv, order: &Order, memory: &Path) -> Result<(Child, u16), Fai
         .spawn()
         .map_err(|error| format!("cannot run {}: {error}", venv.rerun.display()))?;
     Ok((child, port))
-}
-
-fn free_port() -> std::io::Result<u16> {
-    Ok(TcpListener::bind("127.0.0.1:0")?.local_addr()?.port())
 }
 
 fn take(venv: &Venv, order: &Order, viewer: &mut Child, port: u16) -> Result<(), Failure> {

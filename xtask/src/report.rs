@@ -1,8 +1,8 @@
 //! What tests have not tested, and what they repeated: they write it to a file (see `tests/report`), a run shows it
 //! last and fails if it is more than the repository allows.
 
-use crate::Failure;
 use crate::cargo;
+use crate::failure::Failure;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Stages of a check. Each runs, even if one before it failed, so one run shows all failures; a table of what they cost
 //! comes last.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::parts::{Part, Spent, of_ended_children};
 use crate::report;
 use std::fmt::Write;

@@ -3,8 +3,8 @@
 //! The stable toolchain includes ThreadSanitizer's library, but enables it only with `RUSTC_BOOTSTRAP`. That is set
 //! for this build alone.
 
-use crate::Failure;
 use crate::cargo::{self, cargo, host};
+use crate::failure::Failure;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, ExitCode};

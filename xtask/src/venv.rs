@@ -3,8 +3,8 @@
 //!
 //! Rerun's version is that of the `rerun` crate: a viewer reads drawings of its own version best.
 
-use crate::Failure;
 use crate::cargo;
+use crate::failure::Failure;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

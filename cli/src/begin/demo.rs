@@ -2,6 +2,7 @@
 
 mod account;
 mod arguments;
+mod asked;
 mod beyond;
 mod copy;
 mod folder;
@@ -20,15 +21,15 @@ use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, say};
 pub(crate) use arguments::Arguments;
 use arguments::GuiConnection;
+use asked::{FIRST_FUNCTION, map_line, running};
 pub(crate) use copy::{is_built_in, write_map};
 pub(crate) use folder::{Folder, remove_abandoned};
 pub(crate) use gui::{drawing, drawn};
 use recording::{DemoRecording, ONE_NODE};
+use rohrpost::Name;
 use rohrpost::common::State;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CartographerInterface, MapCounts, PlayerInterface, Progress};
-use rohrpost::{Class, Name};
-use rohrpost_config::Installation;
 use rohrpost_launch::{Launch, choose_node, events};
 use rohrpost_mailbox::{ClassTraffic, saturating_sum};
 use std::process::ExitCode;
@@ -147,21 +148,4 @@ fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
     text.push_str(&print_classes(launch.installation(), &survey.classes));
     text.push_str("(data and replies carry the class of the module that asked for them)\n");
     Ok((text, well))
-}
-
-/// Functions that the summary calls; their numbers in the interfaces.
-pub(super) const FIRST_FUNCTION: u16 = 16;
-
-/// The module of a class, if it runs.
-pub(super) fn running(installation: &Installation, class: &str) -> Option<Name> {
-    let class: Class = installation.classes.id(class)?;
-    installation.modules.iter().flat_map(|module| module.names()).find(|name| name.class() == class)
-}
-
-pub(super) fn map_line(counts: &MapCounts) -> String {
-    let MapCounts { scans, odometries, mapped, without_pose, free, occupied } = counts;
-    format!(
-        "map: {scans} scans and {odometries} odometry received, {mapped} scans mapped ({without_pose} without pose), \
-         {free} cells free, {occupied} occupied\n"
-    )
 }

@@ -5,9 +5,7 @@ use crate::nodes::round::{Round, Rounds};
 use crate::terminal::table::{table, time};
 use crate::terminal::units::date;
 use crate::terminal::{Failure, say};
-use rohrpost::interfaces::{
-    BeyondLink, BeyondTime, ClockRole, ClockState, NewEpochError, RouterInterface, TcpInterface,
-};
+use rohrpost::interfaces::{BeyondTime, ClockRole, ClockState, NewEpochError, RouterInterface, TcpInterface};
 use rohrpost::wire::from_bytes;
 use rohrpost_config::{Reach, TimeSource};
 use rohrpost_launch::launcher::{AskLaunch, launcher_of};
@@ -141,7 +139,10 @@ fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {
     let is_beyond = installation.node(&told.node).is_some_and(|node| node.reach == Reach::Tcp);
     let client = installation.tcp_client_of(&told.node).filter(|_| is_beyond);
     let asked = match client {
-        Some(client) => round.newest_of(client, TcpInterface::LINK).map(|(_, link)| told.by_tcp(link)),
+        Some(client) => round.newest_of(client, TcpInterface::LINK).map(|(_, link)| {
+            (told.beyond, told.round_trip_ns) = (link.time, link.round_trip_ns);
+            told.beyond.as_ref().map(|time| time.now_ns)
+        }),
         // A node alone on its LAN has no router: its time is the common one.
         None if installation.network.is_none() => {
             told.by_page(clock.record().filter(|_| told.node == round.running.node_name))
@@ -161,12 +162,6 @@ fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {
 }
 
 impl NodeTime {
-    /// Takes the report of a client of the TCP router; `at` is its system time.
-    fn by_tcp(&mut self, link: BeyondLink) -> Option<u64> {
-        (self.beyond, self.round_trip_ns) = (link.time, link.round_trip_ns);
-        self.beyond.as_ref().map(|time| time.now_ns)
-    }
-
     /// Takes what the page of this node says.
     fn by_page(&mut self, page: Option<TimeRecord>) -> Result<Option<u64>, String> {
         let Some(record) = page else { return Ok(None) };

@@ -161,7 +161,7 @@ impl ModuleOrder<'_> {
         Ok(survey.module(self.name).and_then(|module| module.process.clone()))
     }
 
-    /// Its last error, as it says itself.
+    /// The last error, as the module says itself.
     fn error(&mut self) -> String {
         let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
         plain::line(&why).into_owned()

@@ -4,8 +4,9 @@ mod arguments;
 mod levels;
 mod reader;
 mod recorded;
+mod show;
 
-use crate::terminal::{Failure, complain, say, say_folded};
+use crate::terminal::Failure;
 pub(crate) use arguments::Arguments;
 use arguments::Filter;
 use levels::Setting;
@@ -13,6 +14,7 @@ use reader::Reader;
 pub(crate) use reader::{LINES_FROM, collector};
 use rohrpost::output::OutputLine;
 use rohrpost_builtin::format::Format;
+use show::{Show, keep_last};
 use std::collections::VecDeque;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -49,14 +51,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let show = Show { filter, format: Format::new(&running.installation), arguments };
     let mut reader = Reader::new(&running, collector);
     show.all(&mut reader, &mut tool).map(|()| code)
-}
-
-/// Adds a line to the last ones, of which so many are kept.
-fn keep_last(last: &mut VecDeque<OutputLine>, line: OutputLine, count: usize) {
-    last.push_back(line);
-    if last.len() > count {
-        last.pop_front();
-    }
 }
 
 impl Show<'_> {
@@ -102,28 +96,5 @@ impl Show<'_> {
                 return Ok(true);
             }
         }
-    }
-}
-
-/// The selected lines and their format.
-struct Show<'a> {
-    filter: Filter,
-    format: Format<'a>,
-    arguments: &'a Arguments,
-}
-
-impl Show<'_> {
-    /// False when nobody reads any more.
-    fn line(&self, line: &OutputLine) -> bool {
-        if self.arguments.json { say(self.format.json(line)) } else { say_folded(self.format.short(line)) }
-    }
-
-    /// A notice of the tool between the lines; programs get only lines.
-    fn note(&self, note: &str) -> bool {
-        if self.arguments.json {
-            complain(format_args!("… {note}"));
-            return true;
-        }
-        say_folded(format_args!("… {note}"))
     }
 }

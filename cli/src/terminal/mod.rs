@@ -1,7 +1,6 @@
 //! The command's output at the terminal.
 
-pub(crate) mod help;
-pub(crate) mod signed;
+pub(crate) mod parser;
 pub(crate) mod speech;
 pub(crate) mod table;
 pub(crate) mod units;

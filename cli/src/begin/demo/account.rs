@@ -2,7 +2,7 @@
 
 use crate::nodes::quantities::counted;
 use crate::terminal::table::table;
-use rohrpost::interfaces::{ClassCarried, Links, PeerLink};
+use rohrpost::interfaces::Links;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -33,7 +33,7 @@ impl Balance {
         let survived = |node: &str| !died.contains(&node);
         let to_survivors = links.iter().filter(|links| survived(&links.node));
         let peers = to_survivors.flat_map(|to| to.peers.iter().filter(|from| survived(&from.node)));
-        balance.datagrams = peers.map(gone).sum();
+        balance.datagrams = peers.map(|peer| peer.counters.lost + peer.counters.damaged).sum();
         if died.is_empty() {
             balance.by_class(links, tool)
         } else {
@@ -47,7 +47,7 @@ impl Balance {
         let waiting: u64 = node.waiting.iter().map(|level| level.packages).sum();
         let (mut into, mut out) = (0, waiting);
         for class in &node.classes {
-            let lost = lost_of(class);
+            let lost: u64 = class.lost.iter().map(|lost| lost.packages).sum();
             into += class.taken + class.came;
             out += class.sent + class.delivered + lost;
             self.lost += lost;
@@ -126,15 +126,6 @@ impl fmt::Display for Balance {
     }
 }
 
-fn lost_of(class: &ClassCarried) -> u64 {
-    class.lost.iter().map(|lost| lost.packages).sum()
-}
-
-/// Datagrams from a peer that did not arrive intact.
-fn gone(peer: &PeerLink) -> u64 {
-    peer.counters.lost + peer.counters.damaged
-}
-
 /// A row for each pair of nodes and direction, as counted by the receiver.
 pub(super) fn by_link(links: &[Links]) -> String {
     let pairs = links.iter().flat_map(|to| to.peers.iter().map(move |from| (from, to)));
@@ -148,7 +139,7 @@ pub(super) fn by_link(links: &[Links]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost::interfaces::{Carried, CarriedLoss, LinkCounters, LinkState};
+    use rohrpost::interfaces::{Carried, CarriedLoss, ClassCarried, LinkCounters, LinkState, PeerLink};
 
     const TOOL: u8 = 16;
 

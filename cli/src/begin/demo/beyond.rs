@@ -3,7 +3,7 @@
 use crate::look::newest;
 use crate::look::summary::class_name;
 use crate::nodes::net;
-use crate::nodes::slots::lost;
+use crate::nodes::tables::lost;
 use crate::terminal::Failure;
 use crate::terminal::table::table;
 use rohrpost::interfaces::{BeyondLink, BeyondState, CarriedLoss, ClassPassed, TcpInterface};

@@ -2,16 +2,17 @@
 
 use super::account::{self, Balance};
 use super::arguments::{Arguments, GuiConnection};
+use super::asked::{FIRST_FUNCTION, map_line, running};
 use super::gui::{drawing, drawn};
 use super::losses::ExchangeLosses;
 use super::replicas::RecordBalance;
 use super::takeover::{TakeoverRecord, Victim, Watch};
-use super::{FIRST_FUNCTION, beyond, copy, map_line, running};
+use super::{beyond, copy};
 use crate::launch::{LaunchedNodes, lab};
 use crate::look::newest;
 use crate::look::summary::print_classes;
+use crate::nodes::tables;
 use crate::nodes::vocabulary::Vocabulary;
-use crate::nodes::{flows, slots};
 use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, say};
 use rohrpost::ToolLink;
@@ -115,7 +116,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
     let beyond = beyond::ask(installation, &mut tool)?;
     let mut vocabulary = Vocabulary::default();
-    let late = flows::measured(installation, &late, &links.iter().collect::<Vec<_>>(), &mut vocabulary, |module| {
+    let late = tables::measured(installation, &late, &links.iter().collect::<Vec<_>>(), &mut vocabulary, |module| {
         tool.describe(module).ok()
     });
     let losses = losses.table(installation, &mut vocabulary, |module| tool.describe(module).ok());
@@ -135,7 +136,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     }
     text += &map;
     text.extend(errors.iter().map(|error| format!("{error}\n")));
-    let carried = slots::by_class(installation, &links, |_| true);
+    let carried = tables::by_class(installation, &links, |_| true);
     text += &part("Over the network; age: from the stamp of data to the mailbox on the other node", &carried);
     text += &part("Streams by replicas; delay: from writing to the arrival of the whole record", &records.table());
     text += &beyond::text(installation, &beyond, seen.tcp_router_died());
@@ -149,11 +150,11 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     text += "(data and replies carry the class of the module that asked for them)\n";
     text += &part(
         "In time slots; off: how far the last frames were from the beginnings of their slots",
-        &slots::kept(&kept.unwrap_or_default()),
+        &tables::kept(&kept.unwrap_or_default()),
     );
     text += &part("Declared flows; a slot that was late or skipped costs a cycle", &late);
     if !late.is_empty() {
-        text += &flows::legend();
+        text += &tables::flows_legend();
     }
     if !installation.flows.is_empty() {
         text += &part(

@@ -11,7 +11,6 @@
 
 mod blueprint;
 mod c;
-mod export;
 mod file;
 mod names;
 mod python;
@@ -25,6 +24,8 @@ use crate::look::target::Target;
 use crate::terminal::whole_file::write_whole;
 use crate::terminal::{Failure, say, say_folded};
 use rohrpost::output::plain;
+use rohrpost::schema::Description;
+use rohrpost_config::{Installation, Program};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -88,7 +89,7 @@ enum Language {
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.action {
         InterfaceCommand::Export(export) => {
-            let description = export::find(&export.name, &export.target)?;
+            let description = find(&export.name, &export.target)?;
             match (export.json, &export.output) {
                 (true, output) => put(output.as_deref(), &file::write(&description)?)?,
                 (false, Some(output)) => put(Some(output), &crate::running::call::listing(&description))?,
@@ -115,11 +116,58 @@ fn put(output: Option<&Path>, text: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-fn generated(description: &rohrpost::schema::Description, lang: Language) -> Result<String, refusal::Refusal> {
+fn generated(description: &Description, lang: Language) -> Result<String, refusal::Refusal> {
     let blueprint = blueprint::Blueprint::of(description)?;
     match lang {
         Language::Rust => rust::write(&blueprint),
         Language::Python => python::write(&blueprint),
         Language::C => c::write(&blueprint),
     }
+}
+
+/// The interface of a module (`motor.0`) or class (`motor`). What runs is asked first; the programs of the built-in
+/// modules are known without that, those of others are not.
+pub(super) fn find(name: &str, target: &Target) -> Result<Description, Failure> {
+    let asked = if name.contains('.') { of_module(name, target) } else { of_class(name, target) };
+    asked.or_else(|error| built_in(name, target).ok_or_else(|| not_found(name, &*error)))
+}
+
+fn of_module(name: &str, target: &Target) -> Result<Description, Failure> {
+    let running = target.find()?;
+    running.describe(running.module(name)?)
+}
+
+/// Of the first module of this class that answers.
+fn of_class(class: &str, target: &Target) -> Result<Description, Failure> {
+    let running = target.find()?;
+    let Some(id) = running.installation.classes.id(class) else {
+        return Err(format!("the configuration has no class `{}`", plain::line(class)).into());
+    };
+    let names = running.installation.modules.iter().flat_map(|module| module.names()).filter(|it| it.class() == id);
+    let mut last = format!("no module of class `{class}` is in the configuration").into();
+    for name in names.collect::<Vec<_>>() {
+        match running.describe(name) {
+            Ok(description) => return Ok(description),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+/// What a program that comes with Rohrpost offers: the one that the configuration names for it, else that of its class.
+fn built_in(name: &str, target: &Target) -> Option<Description> {
+    let Some((class, _)) = name.rsplit_once('.') else {
+        return rohrpost_builtin::description(rohrpost_builtin::of_class(name)?, name);
+    };
+    let installation = Installation::load(target.config()?).ok()?;
+    let module = installation.module(installation.classes.parse_name(name).ok()?.module())?;
+    match &module.program {
+        Program::Builtin(program) => rohrpost_builtin::description(program, class.rsplit('.').next()?),
+        Program::Command(_) => None,
+    }
+}
+
+fn not_found(name: &str, error: &dyn std::error::Error) -> Failure {
+    let advice = "a module says its interface while it runs; what is built in is also known by its class alone";
+    format!("no interface of `{}`: {error}\n{advice}, as `rohrpost interface export motor`", plain::line(name)).into()
 }

@@ -1,6 +1,6 @@
 //! `stream write`: files into a stream, each as a record.
 
-use super::choice::{ChosenStream, StreamChoice};
+use super::choice::StreamChoice;
 use super::stamp::{parse_stamp, stamp_text};
 use crate::terminal::units::{Stop, seconds, size_argument};
 use crate::terminal::{Failure, complain, say};
@@ -68,17 +68,12 @@ pub(super) fn run(arguments: &WriteArguments) -> Result<ExitCode, Failure> {
         let ns = arguments.stamp.map_or(now.ns, |first| first.saturating_add(nth_ns(delay, at)));
         let stamp = Stamp { epoch: now.epoch, ns };
         let written = writer.write(stamp, &bytes);
-        let sequence = written.map_err(|error| named(&chosen, &error.to_string()))?;
+        let sequence = written.map_err(|error| error.to_string().replace(&chosen.id.to_string(), &chosen.text()))?;
         if !say(line(arguments.json, sequence, stamp, bytes.len(), file)) {
             break;
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// An error about the stream, with its name as people type it.
-fn named(chosen: &ChosenStream, error: &str) -> String {
-    error.replace(&chosen.id.to_string(), &chosen.text())
 }
 
 fn nth_ns(delay: Duration, at: u32) -> u64 {

@@ -5,7 +5,7 @@ use super::node_report::NodeReport;
 use crate::look::summary::class_name;
 use crate::look::target::Running;
 use crate::nodes::quantities::{cells, counted, heads};
-use crate::nodes::slots::lost;
+use crate::nodes::tables::lost;
 use crate::terminal::table::{table_of, time};
 use rohrpost::Class;
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondLink, BeyondState, ClassPassed};

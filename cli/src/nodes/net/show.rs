@@ -3,9 +3,8 @@
 use super::beyond;
 use super::node_report::NodeReport;
 use crate::look::target::Running;
-use crate::nodes::flows;
 use crate::nodes::quantities::counted;
-use crate::nodes::slots::{by_class, kept};
+use crate::nodes::tables::{self, by_class, kept};
 use crate::nodes::vocabulary::Vocabulary;
 use crate::terminal::table::{table, time};
 use crate::terminal::units::{self, bytes, fine};
@@ -143,8 +142,8 @@ fn measured(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) 
     let links: Vec<&Links> = reports(all).collect();
     let states = all.iter().filter_map(|told| told.flows.as_ref());
     let table =
-        flows::measured(&running.installation, states, &links, vocabulary, |module| running.describe(module).ok());
-    if table.is_empty() { table } else { format!("{table}{}", flows::legend()) }
+        tables::measured(&running.installation, states, &links, vocabulary, |module| running.describe(module).ok());
+    if table.is_empty() { table } else { format!("{table}{}", tables::flows_legend()) }
 }
 
 /// Replicas, each on both of its ends; empty if there is none.

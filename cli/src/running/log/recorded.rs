@@ -1,7 +1,7 @@
 //! Lines of output from recordings: always the one that arrived first of those that are next in their files.
 
 use super::arguments::{Arguments, Filter};
-use super::{Show, keep_last};
+use super::show::{Show, keep_last};
 use crate::look::{parse_name, unknown_module};
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;
@@ -14,7 +14,6 @@ use rohrpost_recording::{ChannelInfo, Damage, Info, ReadError, Reader, Selection
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
 /// Name of the type of lines, in all versions.
 const TYPE: &str = "OutputLine";
@@ -31,7 +30,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Err(format!("{why}; write --level {level} --module {name}").into());
     }
     let since = arguments.since.as_deref().map(rohrpost_config::parse_duration).transpose()?;
-    filter.since_ns = since.and_then(|since| before_the_end(&infos, since));
+    let last_ns = infos.iter().filter_map(|info| info.last_ns).max();
+    filter.since_ns = last_ns
+        .zip(since)
+        .map(|(last_ns, since)| last_ns.saturating_sub(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)));
     let show = Show { filter, format: Format::new(&installation), arguments };
     if !infos.iter().flat_map(flaws).all(|flaw| show.note(&flaw)) {
         return Ok(ExitCode::SUCCESS);
@@ -67,11 +69,6 @@ fn find(text: &str, installation: &Installation) -> Result<Name, Failure> {
     let name = parse_name(installation, text, Vec::new)?.module();
     let is_known = installation.module(name).is_some() || name.class() == installation.classes.tool();
     if is_known { Ok(name) } else { Err(unknown_module(installation, text)) }
-}
-
-fn before_the_end(infos: &[Info], since: Duration) -> Option<u64> {
-    let last_ns = infos.iter().filter_map(|info| info.last_ns).max()?;
-    Some(last_ns.saturating_sub(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)))
 }
 
 fn has_lines(channel: &ChannelInfo) -> bool {

@@ -1,15 +1,12 @@
 //! `rohrpost param`: settings of modules that change at run time.
 
 mod save;
-mod set;
-mod show;
+mod session;
+mod values;
 
-use crate::look::observer::Tool;
-use crate::look::target::{Running, Target};
-use crate::terminal::{Failure, complain};
-use rohrpost::output::plain;
-use rohrpost::parameter::{Parameter, Refusal};
-use rohrpost::{CallError, Fault, Name};
+use crate::look::target::Target;
+use crate::terminal::Failure;
+use session::Session;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -110,19 +107,19 @@ struct Load {
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.action {
         ParamCommand::List(list) => {
-            at_work(&list.common, |session| show::list(session, list.name.as_deref(), list.json))
+            at_work(&list.common, |session| values::list(session, list.name.as_deref(), list.json))
         }
         ParamCommand::Get(get) => {
-            at_work(&get.common, |session| show::get(session, &get.name, get.parameter.as_deref(), get.json))
+            at_work(&get.common, |session| values::get(session, &get.name, get.parameter.as_deref(), get.json))
         }
         ParamCommand::Set(set) => {
-            at_work(&set.common, |session| set::run(session, &set.name, &set.parameter, &set.value))
+            at_work(&set.common, |session| values::set_one(session, &set.name, &set.parameter, &set.value))
         }
         ParamCommand::Save(save) => {
             at_work(&save.common, |session| save::run(session, &save.names, save.output.as_deref()))
         }
         ParamCommand::Load(load) => {
-            at_work(&load.common, |session| set::load_file(session, load.file.as_deref(), load.dry_run))
+            at_work(&load.common, |session| values::load_file(session, load.file.as_deref(), load.dry_run))
         }
     }
 }
@@ -132,64 +129,4 @@ fn at_work(common: &Common, work: impl FnOnce(&mut Session) -> Result<ExitCode, 
     let running = common.target.find()?;
     let tool = running.join(crate::terminal::units::seconds(common.timeout)?)?;
     work(&mut Session { running, tool })
-}
-
-/// A running node, and a place on it.
-struct Session {
-    running: Running,
-    tool: Tool,
-}
-
-impl Session {
-    fn parameters(&mut self, module: Name) -> Result<Vec<Parameter>, Failure> {
-        match self.tool.parameters(module) {
-            Err(CallError::Fault(_, Fault::Unknown(_))) => {
-                let name = self.running.text(module);
-                Err(format!("{name} was built with a Rohrpost that had no parameters; rebuild it").into())
-            }
-            other => other.map_err(|error| self.running.told(module, &error)),
-        }
-    }
-
-    /// All modules of the configuration; those that cannot be asked are reported.
-    fn modules(&self) -> Result<Vec<Name>, Failure> {
-        let mut asked = Vec::new();
-        for (module, silence) in self.running.modules_to_ask()? {
-            match silence {
-                Some(silence) => complain(format_args!("{}: {}", self.running.text(module), silence.text())),
-                None => asked.push(module),
-            }
-        }
-        Ok(asked)
-    }
-
-    /// A refusal or failed call, with the module's name and what to try.
-    fn refused(&self, module: Name, error: CallError<Refusal>) -> Failure {
-        match error {
-            CallError::NotSent(error @ rohrpost_mailbox::SendError::TooLarge { .. }) => {
-                let told = self.running.told(module, &error);
-                format!("{told}; raise `size` in [module.mailbox.commands] of the module, or set fewer at a time")
-                    .into()
-            }
-            error => self.running.told(module, &error),
-        }
-    }
-}
-
-/// The parameter of this name; else an error with the nearest name and all names.
-fn find<'p>(parameters: &'p [Parameter], module: &str, name: &str) -> Result<&'p Parameter, Failure> {
-    let unknown = || {
-        if parameters.is_empty() {
-            return no_parameters(module).into();
-        }
-        let names: Vec<&str> = parameters.iter().map(|parameter| parameter.field.name.as_str()).collect();
-        let nearest = rohrpost_config::nearest(name, names.iter().copied());
-        let nearest = nearest.map_or(String::new(), |nearest| format!("did you mean `{nearest}`? "));
-        plain::line(&format!("{module} has no parameter `{name}`; {nearest}it has: {}", names.join(", "))).into()
-    };
-    parameters.iter().find(|parameter| parameter.field.name == name).ok_or_else(unknown)
-}
-
-fn no_parameters(module: &str) -> String {
-    format!("{module} has no parameters: its settings are read when it starts")
 }

@@ -1,6 +1,6 @@
 //! `param save`, and the file that it writes: TOML that people can read and `param load` can load.
 
-use super::{Session, no_parameters};
+use super::session::{Session, no_parameters};
 use crate::terminal::whole_file::write_whole;
 use crate::terminal::{Failure, complain, say};
 use rohrpost::output::plain;
