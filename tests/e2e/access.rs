@@ -27,7 +27,7 @@ fn on_one_node_a_class_that_is_not_listed_commands_nothing_and_is_told_the_line(
     }
     assert_eq!((place.counted(), robot.state("probe.0")), (Vec::new(), "on"), "launch switched it on");
     let hears = || place.record().iter().any(|line| line.starts_with("probe.1 each"));
-    until("a class that is listed subscribes", || hears());
+    until("a class that is listed subscribes", hears);
     tool.close();
     launch.stop();
 }

@@ -166,8 +166,7 @@ fn packed_by(place: &Place, text: &str) -> PathBuf {
     record(15, vec![0; 4]);
     record(2, vec![0; 20]);
     bytes.extend(mcap::MAGIC);
-    let path = place.write("packed.mcap", bytes);
-    path
+    place.write("packed.mcap", bytes)
 }
 
 #[test]

@@ -27,7 +27,7 @@ fn long_records_are_taken_out_of_the_recording_and_a_missing_one_is_refused() {
     let (mut launch, _robot) = seers_recorded(&place, &["pictures"], "streams = [\"seer.0/picture\"]\n");
     let file = recording(&place, 1);
     let is_recorded = || place.say(&["call", "logd.0", "channels", "0"]).ok().contains("seer.0/picture");
-    until("its pictures are recorded", || is_recorded());
+    until("its pictures are recorded", is_recorded);
     // From now on it writes pictures, and reads each twice.
     place.say(&["call", "seer.0", "add", "1"]).ok();
     wait_journaled(&file, "seer.0", 20);
@@ -60,7 +60,7 @@ fn a_recorder_that_starts_again_goes_on_behind_what_is_in_a_file() {
     let (mut launch, robot) = seers_recorded(&place, &["pictures"], "streams = [\"seer.0/picture\"]\n");
     let [first, second, third] = [1, 2, 3].map(|number| recording(&place, number));
     let is_recorded = || place.say(&["call", "logd.0", "channels", "0"]).ok().contains("seer.0/picture");
-    until("its pictures are recorded", || is_recorded());
+    until("its pictures are recorded", &is_recorded);
     place.say(&["call", "seer.0", "add", "1"]).ok();
     wait_journaled(&first, "seer.0", 20);
 
@@ -71,14 +71,14 @@ fn a_recorder_that_starts_again_goes_on_behind_what_is_in_a_file() {
     until("pictures that nobody records", || written(&robot) > before + 5);
     halt(seer);
     robot.wait_restarted("logd.0", killed);
-    until("its pictures are recorded again", || is_recorded());
+    until("its pictures are recorded again", &is_recorded);
     signal(seer, Signal::SIGCONT);
     wait_journaled(&second, "seer.0", 20);
     let recovered = rohrpost_recording::recovered_path(&first);
     until("what was killed is made whole", || recovered.exists());
     halt(seer);
     place.say(&["restart", "logd.0"]).ok();
-    until("its pictures are recorded by the third", || is_recorded());
+    until("its pictures are recorded by the third", is_recorded);
     signal(seer, Signal::SIGCONT);
     wait_journaled(&third, "seer.0", 20);
     launch.stop();

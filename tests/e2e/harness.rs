@@ -143,8 +143,8 @@ pub(crate) fn times<T: FromStr<Err: Debug>>(variable: &str, usually: T) -> T {
     std::env::var(variable).map_or(usually, |times| times.parse().unwrap())
 }
 
-/// What a module's program does that is this test program: launch, or an exact replay, runs it by one test alone. Run as
-/// a test that ends at once.
+/// What a module's program does that is this test program: launch, or an exact replay, runs it by one test alone. Run
+/// as a test that ends at once.
 pub(crate) fn run_if_launched<M: Module>() {
     if ["ROHRPOST_MODULE", "ROHRPOST_EXACT"].iter().any(|variable| std::env::var_os(variable).is_some()) {
         let ended = Start::from_environment().and_then(run_started::<M>);

@@ -38,7 +38,7 @@ fn modules(place: &Place) -> Vec<String> {
         classes("seer 107"),
         OUTPUT.into(),
         entry("camera.0", &quoted(&example(place, "camera")), &format!("{RESTART}\n{stream}")),
-        entry("viewer.0", &quoted(&compiled(place, &Path::new(&repository(WATCHER)))), &reads),
+        entry("viewer.0", &quoted(&compiled(place, Path::new(&repository(WATCHER)))), &reads),
         entry("looker.0", &looker, &reads),
         entry("seer.0", &quoted(&seer(place)), &reads),
     ]

@@ -282,8 +282,8 @@ fn a_view_that_outlives_its_record_is_told_and_leads_nowhere_else() {
             "picky 1: BadReply: ",
             "`odometry` of odometry.0: its class does not take it: ValueError: too far",
             "laser: dict",
-            "meanwhile: {'Misuse: `image` of camera.0 was opened in another thread, that of its module, which alone may \
-         read it'}",
+            "meanwhile: {'Misuse: `image` of camera.0 was opened in another thread, that of its module, which alone \
+         may read it'}",
         ],
     );
     scene.stop();

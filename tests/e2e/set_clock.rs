@@ -134,7 +134,7 @@ fn nodes_follow_a_master_that_begins_an_epoch_when_it_is_asked_from_anywhere_or_
         computer.set(0);
         if when_set == "tell" {
             let ahead = || computer.say(&["time", "--config", config.to_str().unwrap()]).out.contains(" days ahead of");
-            until("time says so", || ahead());
+            until("time says so", ahead);
             assert_eq!(all_know(true), Some(before), "nothing changes unasked");
             let words = ["time", "--config", config.to_str().unwrap(), "--node", "arm", "--new-epoch"];
             computer.say(&words).ok_with([" of time: 20"]);

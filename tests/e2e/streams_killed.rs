@@ -37,8 +37,7 @@ fn demo(place: &Place) -> PathBuf {
         within = "50 ms"
     };
     sim.insert("restart".into(), restart.into());
-    let file = place.write("demo.toml", toml::to_string(&demo).unwrap());
-    file
+    place.write("demo.toml", toml::to_string(&demo).unwrap())
 }
 
 /// A stream, and what its readers in this test have seen of it.

@@ -143,7 +143,7 @@ pub(crate) fn check_crossing(systems: &Systems) {
     assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "2"]).ok(), "2\n", "by another tool");
     assert_eq!(systems.says("south", &["call", "1.probe.0.0", "count", "3"]).ok(), "1\n", "the other way");
     let hears = || systems.place.record().iter().any(|line| line.starts_with("probe.0 each "));
-    until("beats of the other system's module", || hears());
+    until("beats of the other system's module", hears);
     let data = systems.says("north", &["echo", "2.probe.0.0", "beat", "--count", "3"]).ok();
     assert_eq!(data.lines().count(), 3, "{data}");
     let word = "x".repeat(900);

@@ -1,9 +1,8 @@
 //! Incompatible nodes: one with another configuration, and one with another version of the wire format.
 
 use super::flow::{PLAIN, Sink, Source, carried, lost};
-use super::{Field, LOG, configure, lines};
-use crate::harness::{OUTPUT, PATIENCE, until, wait};
-use crate::network::at;
+use super::{Field, lines};
+use crate::harness::{PATIENCE, until, wait};
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_config::Installation;

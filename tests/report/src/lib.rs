@@ -1,9 +1,9 @@
-//! What tests of all crates share: how they wait, and the report of what they did not test and what they tried again, so
-//! that a run does not hide it.
+//! What tests of all crates share: how they wait, and the report of what they did not test and what they tried again,
+//! so that a run does not hide it.
 //!
-//! Each report goes to stderr past the test harness, which keeps what passing tests print to itself, and as a line to the file
-//! that [`FILE`] names, if it does: `skipped` or `repeated`, the place in the source, the reason; tabs in between.
-//! `cargo xtask test` prints all of them last, and fails if there are more than the repository allows.
+//! Each report goes to stderr past the test harness, which keeps what passing tests print to itself, and as a line to
+//! the file that [`FILE`] names, if it does: `skipped` or `repeated`, the place in the source, the reason; tabs in
+//! between. `cargo xtask test` prints all of them last, and fails if there are more than the repository allows.
 
 #![forbid(unsafe_code)]
 
