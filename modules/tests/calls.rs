@@ -287,27 +287,10 @@ fn a_call_to_all_systems_has_the_first_answer_and_no_fault_of_one_of_them() {
     let command = take(&mut ground.other);
     let (incarnation, fault) = (command.envelope.incarnation, postcard::to_stdvec(&Fault::NoMailbox).unwrap());
     ground.answer_as(Name::new(2, 200, 1, 0), incarnation, sequence, Options::ERROR, &fault);
-    // It has called no other module.
-    ground.answer_as(
-        Name::new(3, 201, 1, 0),
-        incarnation,
-        sequence,
-        Options::default(),
-        &postcard::to_stdvec(&1_u32).unwrap(),
-    );
-    ground.answer_as(
-        Name::new(3, 200, 1, 0),
-        incarnation,
-        sequence,
-        Options::default(),
-        &postcard::to_stdvec(&8_u32).unwrap(),
-    );
-    ground.answer_as(
-        Name::new(4, 200, 1, 0),
-        incarnation,
-        sequence,
-        Options::default(),
-        &postcard::to_stdvec(&9_u32).unwrap(),
-    );
+    // It has not called the first of these; the last comes too late.
+    for (system, class, answer) in [(3, 201, 1_u32), (3, 200, 8), (4, 200, 9)] {
+        let answer = postcard::to_stdvec(&answer).unwrap();
+        ground.answer_as(Name::new(system, class, 1, 0), incarnation, sequence, Options::default(), &answer);
+    }
     assert_eq!(ground.wait(sequence).unwrap(), 8);
 }

@@ -12,6 +12,8 @@ use rohrpost_modules::types::{
     Bytes, Image, ImageFormat, LaserScan, OccupancyGrid, Odometry, PointCloud, PointFormat, Pose, Twist,
 };
 use rohrpost_schema::{Schema, Type as Described};
+use serde::Serialize;
+use std::fmt::Display;
 
 const PAGE: &str = include_str!("../../docs/src/wire.md");
 
@@ -78,8 +80,6 @@ fn setting_a_parameter_has_the_documented_bytes() {
 
 #[test]
 fn refusals_have_the_documented_numbers() {
-    let (table, _) = PAGE.split("| | refusal |").nth(1).unwrap().split_once("\n\n").unwrap();
-    let rows = table.lines().skip(2).count();
     let (name, text) = (String::new(), String::new());
     let refusals = [
         Refusal::NoParameters,
@@ -89,10 +89,7 @@ fn refusals_have_the_documented_numbers() {
         Refusal::Range { name, value: text.clone(), range: text.clone() },
         Refusal::Module(text),
     ];
-    assert_eq!(rows, refusals.len());
-    for (number, refusal) in refusals.iter().enumerate() {
-        assert_eq!(usize::from(postcard::to_stdvec(refusal).unwrap()[0]), number, "{refusal}");
-    }
+    check_numbers("| | refusal |", &refusals);
 }
 
 #[test]
@@ -114,8 +111,6 @@ fn a_line_of_output_has_the_documented_bytes() {
 
 #[test]
 fn faults_have_the_documented_numbers() {
-    let (table, _) = PAGE.split("| | fault |").nth(1).unwrap().split_once("\n\n").unwrap();
-    let rows = table.lines().skip(2).count();
     let text = String::new;
     let faults = [
         Fault::ModuleOff,
@@ -140,10 +135,7 @@ fn faults_have_the_documented_numbers() {
         Fault::NotAllowed { node: text(), rule: text() },
         Fault::EarlierIncarnation,
     ];
-    assert_eq!(rows, faults.len());
-    for (number, fault) in faults.iter().enumerate() {
-        assert_eq!(usize::from(postcard::to_stdvec(fault).unwrap()[0]), number, "{fault}");
-    }
+    check_numbers("| | fault |", &faults);
 }
 
 #[test]
@@ -164,6 +156,14 @@ fn rows(head: &str) -> Vec<(String, String)> {
     let (table, _) = PAGE.split(head).nth(1).unwrap().split_once("\n\n").unwrap();
     let cells = |line: &str| -> Vec<String> { line.split('|').map(|cell| cell.trim().to_owned()).collect() };
     table.lines().skip(2).map(cells).map(|cells| (cells[1].clone(), cells[2].clone())).collect()
+}
+
+/// All there are in a table, in its order.
+fn check_numbers<T: Serialize + Display>(head: &str, all: &[T]) {
+    assert_eq!(rows(head).len(), all.len());
+    for (number, one) in all.iter().enumerate() {
+        assert_eq!(usize::from(postcard::to_stdvec(one).unwrap()[0]), number, "{one}");
+    }
 }
 
 #[test]

@@ -108,7 +108,7 @@ fn a_journal_does_not_touch_the_heap() {
     let hosted = host::<Wheels>("journal", &RECORD.replace("MODULE", "motor.0"));
     let before = work(&hosted.motor, 1000, 1000, |_| ());
     let id = StreamId { name: MOTOR, number: JOURNAL_NUMBER };
-    let node = Node::open(&hosted.path).unwrap();
+    let node = Node::open(hosted.place.node.path()).unwrap();
     let written = || node.inspect_stream(id).unwrap().unwrap().written;
     let pieces = written();
     assert!(pieces > 0, "it counts");

@@ -4,21 +4,18 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, node_directory};
-use rohrpost_modules::call::{CallError, Caller, Fault};
-use rohrpost_modules::common::State;
-use rohrpost_modules::interface::{Interface, Proxy, StandIn, StandInCommand};
+use rohrpost_mailbox::Name;
+use rohrpost_modules::call::{CallError, Fault};
+use rohrpost_modules::interface::{Interface, StandIn, StandInCommand};
 use rohrpost_modules::interfaces::{LaserInterface, LaserProxy, MotorInterface, MotorProxy};
-use rohrpost_modules::runtime::{Context, ContextError, Start, StartError, ToolLink, run_started};
+use rohrpost_modules::runtime::{Context, ContextError, StartError, run_started};
 use rohrpost_modules::schema::Description;
 use rohrpost_modules::types::{LaserScan, Twist};
 use rohrpost_modules::{Module, ModuleError, description, wire};
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use support::Place;
 
-const PATIENCE: Duration = Duration::from_secs(60);
+pub mod support;
+
 const DRIVE: u16 = 16;
 const TWIST: Twist = Twist { speed_m_s: 0.5, turn_rate_rad_s: -0.25 };
 
@@ -106,54 +103,17 @@ settings = { described = [DESCRIBED] }
 record = "64 KiB"
 "#;
 
-struct Place {
-    installation: Arc<Installation>,
-    node: Arc<Node>,
-    path: PathBuf,
-    _directory: tempfile::TempDir,
-}
-
-impl Place {
-    /// With a player that stands in for these names by these descriptions.
-    fn described(described: &str) -> Self {
-        static NUMBER: AtomicU32 = AtomicU32::new(0);
-        let number = format!("{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
-        let directory = tempfile::tempdir().unwrap();
-        let file = |name: &str, bytes: &[u8]| std::fs::write(directory.path().join(name), bytes).unwrap();
-        file("robot.toml", CONFIG.replace("NUMBER", &number).replace("DESCRIBED", described).as_bytes());
-        file("motor.bin", &MotorInterface::description().to_bytes());
-        file("laser.bin", &LaserInterface::description().to_bytes());
-        file("motion", &encoded(&TWIST));
-        file("scan", &encoded(&scan()));
-        let load = Installation::load(&directory.path().join("robot.toml"));
-        let installation = Arc::new(load.unwrap_or_else(|errors| panic!("{errors}")));
-        let path = node_directory(&installation.name, "main");
-        let node = Node::create(&path, 0o700).unwrap();
-        Self { installation, node, path, _directory: directory }
-    }
-
-    fn name(&self, module: &str) -> Name {
-        self.installation.classes.parse_module(module).unwrap()
-    }
-
-    fn start(&self) -> Start {
-        let name = self.name("player.0");
-        Start { installation: self.installation.clone(), name, launcher: None, restarts: 0, off: false }
-    }
-
-    fn tool(&self) -> ToolLink {
-        ToolLink::join(&self.installation, &self.node, "main", Duration::from_secs(10)).unwrap()
-    }
-
-    fn proxy<P: Proxy>(&self, module: &str) -> P {
-        P::new(&Caller::from(self.tool().link), self.name(module))
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.path);
-    }
+/// A node for a player that stands in for these names by these descriptions.
+fn described(described: &str) -> Place {
+    Place::new(
+        &CONFIG.replace("DESCRIBED", described),
+        &[
+            ("motor.bin", &MotorInterface::description().to_bytes()),
+            ("laser.bin", &LaserInterface::description().to_bytes()),
+            ("motion", &encoded(&TWIST)),
+            ("scan", &encoded(&scan())),
+        ],
+    )
 }
 
 fn encoded<T: serde::Serialize>(value: &T) -> Vec<u8> {
@@ -168,13 +128,12 @@ fn scan() -> LaserScan {
 
 #[test]
 fn programs_with_the_types_take_a_stand_in_for_the_module() {
-    let place = Place::described(r#"["motor.0", "motor.bin"], ["laser.0", "laser.bin"], ["laser.1", "laser.bin"]"#);
-    let start = place.start();
+    let place = described(r#"["motor.0", "motor.bin"], ["laser.0", "laser.bin"], ["laser.1", "laser.bin"]"#);
+    let player = place.name("player.0");
+    let start = place.start_of(player);
     std::thread::spawn(move || run_started::<Player>(start).unwrap());
-    let (mut tool, began) = (place.tool(), Instant::now());
-    while tool.status(place.name("player.0")).ok().is_none_or(|status| status.state != State::On) {
-        assert!(began.elapsed() < PATIENCE, "it does not start");
-    }
+    place.wait_until_on(player, || ());
+    let mut tool = place.tool();
     let noted = description::noted(&place.node, place.name("motor.0")).unwrap();
     assert_eq!((noted.hash(), noted), (MotorInterface::hash(), MotorInterface::description()));
     let motor: MotorProxy = place.proxy("motor.0");
@@ -210,7 +169,8 @@ fn a_module_stands_in_for_its_own_names_by_descriptions_of_their_class() {
         ),
         (motors.into(), "`laser.1` is an alias of `player.0`, but that program has no interface of class `laser`"),
     ] {
-        let refused = run_started::<Player>(Place::described(&described).start()).unwrap_err();
+        let place = self::described(&described);
+        let refused = run_started::<Player>(place.start_of(place.name("player.0"))).unwrap_err();
         assert!(refused.to_string().contains(expected), "{refused}");
         assert_eq!(refused.exit_code(), StartError::CONFIGURATION, "{refused}");
     }

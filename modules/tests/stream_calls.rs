@@ -5,15 +5,17 @@
 
 #![allow(clippy::unwrap_used, reason = "this is a test")]
 
+pub mod support;
+
 #[cfg(target_arch = "x86_64")]
 mod traced {
+    use crate::support::{Place, play};
     use nix::sys::ptrace;
     use nix::sys::signal::{Signal, raise};
     use nix::sys::wait::{WaitStatus, waitpid};
     use nix::unistd::{Pid, getpgid};
-    use rohrpost_config::Installation;
-    use rohrpost_mailbox::{Next, monotonic_ns, node_directory};
-    use rohrpost_modules::runtime::{Context, Start, Stream, run_started};
+    use rohrpost_mailbox::{Next, monotonic_ns};
+    use rohrpost_modules::runtime::{Context, Stream};
     use rohrpost_modules::types::Pose;
     use rohrpost_modules::{Module, ModuleError, interface};
     use std::process::{Command, Stdio};
@@ -84,7 +86,7 @@ mod traced {
     }
 
     const CONFIG: &str = r#"
-installation = "stream-calls-PID"
+installation = "stream-calls-NUMBER"
 [system]
 name = "robot"
 id = 1
@@ -137,11 +139,10 @@ optional = true
     }
 
     pub(crate) fn main() {
-        if let Ok(file) = std::env::var("ROHRPOST_TEST_CONFIG") {
+        if std::env::var_os("ROHRPOST_TEST_CONFIG").is_some() {
             ptrace::traceme().unwrap();
             raise(Signal::SIGSTOP).unwrap();
-            let words = ["--config", &file, "--name", "crane.0"].map(String::from);
-            return run_started::<Hook>(Start::from_arguments(words.into_iter()).unwrap()).unwrap();
+            return play::<Hook>("crane.0");
         }
         for more in ["", EXACT] {
             traced(&format!("{CONFIG}{}", more.replace("MODULE", "crane.0")));
@@ -149,18 +150,14 @@ optional = true
     }
 
     fn traced(config: &str) {
-        let directory = tempfile::tempdir().unwrap();
-        let file = directory.path().join("calls.toml");
-        std::fs::write(&file, config.replace("PID", &std::process::id().to_string())).unwrap();
-        let node = node_directory(&Installation::load(&file).unwrap().name, "main");
+        let place = Place::new(config, &[]);
         #[expect(clippy::zombie_processes, reason = "`follow` waits until it has ended")]
         let child = Command::new(std::env::current_exe().unwrap())
-            .env("ROHRPOST_TEST_CONFIG", &file)
+            .env("ROHRPOST_TEST_CONFIG", &place.installation.path)
             .stdin(Stdio::null())
             .spawn()
             .unwrap();
         let all = follow(Pid::from_raw(child.id() as i32));
-        let _ = std::fs::remove_dir_all(node);
         // Not ours to fix: a clock source that cannot be read without the kernel.
         let slow_clock = all.iter().any(|(step, calls)| *step == 0 && !calls.is_empty());
         for (step, name) in STEPS.iter().enumerate() {

@@ -3,25 +3,25 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
-use rohrpost_config::Installation;
-use rohrpost_mailbox::{Interest, Name, Node, Ready, Watch, node_directory};
+use rohrpost_mailbox::{Interest, Name, Ready, Watch};
 use rohrpost_modules::call::{CallError, Fault};
 use rohrpost_modules::common;
 use rohrpost_modules::interface::Proxy;
 use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy};
-use rohrpost_modules::runtime::{Context, Start, ToolLink, run_started};
+use rohrpost_modules::runtime::Context;
 use rohrpost_modules::types::Twist;
 use rohrpost_modules::{Module, ModuleError};
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::fs::OpenOptionsExt;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
+use std::path::PathBuf;
+use std::process::Child;
 use std::time::{Duration, Instant};
+use support::{PATIENCE, Place, play, process};
+
+pub mod support;
 
 const MOTOR: Name = Name::new(1, 100, 0, 0);
-const PATIENCE: Duration = Duration::from_secs(60);
 
 #[derive(serde::Deserialize)]
 struct Settings {
@@ -86,7 +86,7 @@ impl Motor for Driver {
 }
 
 const CONFIG: &str = r#"
-installation = "watching-PID"
+installation = "watching-NUMBER"
 [system]
 name = "robot"
 id = 1
@@ -105,41 +105,24 @@ settings = { port = "PORT" }
 /// Not a test of its own: the module's process comes here.
 #[test]
 fn role() {
-    let Ok(file) = std::env::var("ROHRPOST_TEST_CONFIG") else { return };
-    let words = ["--config", &file, "--name", "motor.0"].map(String::from);
-    run_started::<Driver>(Start::from_arguments(words.into_iter()).unwrap()).unwrap();
+    play::<Driver>("motor.0");
 }
 
-/// Ended when dropped, and its node removed.
-struct Driving {
-    process: Child,
-    node: PathBuf,
-}
+/// Ended when dropped.
+struct Driving(Child);
 
 impl Driving {
-    fn start(file: &Path, node: PathBuf) -> Self {
-        let process = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "role", "--test-threads=1"])
-            .env("ROHRPOST_TEST_CONFIG", file)
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        Self { process, node }
-    }
-
     /// Names of its threads.
     fn threads(&self) -> Vec<String> {
-        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.process.id())).unwrap();
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.0.id())).unwrap();
         tasks.map(|task| std::fs::read_to_string(task.unwrap().path().join("comm")).unwrap().trim().into()).collect()
     }
 }
 
 impl Drop for Driving {
     fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-        let _ = std::fs::remove_dir_all(&self.node);
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 
@@ -148,26 +131,15 @@ fn a_driver_waits_for_its_port_and_its_mailboxes_with_one_thread() {
     let directory = tempfile::tempdir().unwrap();
     let port = directory.path().join("port");
     nix::unistd::mkfifo(&port, nix::sys::stat::Mode::S_IRWXU).unwrap();
-    let file = directory.path().join("watching.toml");
-    let text = CONFIG.replace("PID", &std::process::id().to_string()).replace("PORT", port.to_str().unwrap());
-    std::fs::write(&file, text).unwrap();
-    let installation = Arc::new(Installation::load(&file).unwrap());
-    let path = node_directory(&installation.name, "main");
-    let mut driving = Driving::start(&file, path.clone());
-
-    let node = Node::create(&path, 0o700).unwrap();
-    let mut tool = ToolLink::join(&installation, &node, "main", Duration::from_secs(5)).unwrap();
-    let began = Instant::now();
-    while tool.status(MOTOR).is_err() {
-        assert!(began.elapsed() < PATIENCE, "it does not start");
-        assert_eq!(driving.process.try_wait().unwrap(), None, "it ended");
-    }
+    let place = Place::new(&CONFIG.replace("PORT", port.to_str().unwrap()), &[]);
+    let mut driving = Driving(process("role", &place.installation.path));
+    place.wait_until_on(MOTOR, || assert_eq!(driving.0.try_wait().unwrap(), None, "it ended"));
     let threads = driving.threads();
     // The test harness's main thread, the module's, and the one for signals.
     assert_eq!(threads.len(), 3, "{threads:?}");
 
     let mut far = OpenOptions::new().write(true).open(&port).unwrap();
-    let link = rohrpost_modules::call::Caller::from(tool.link);
+    let link = place.caller();
     let motor = MotorProxy::new(&link, MOTOR).with_timeout(Duration::from_secs(5));
     let mut written = 0.0;
     let mut write = |bytes: &[u8]| {

@@ -106,7 +106,7 @@ fn world(settings: &Settings, context: &Context) -> Result<World, ModuleError> {
     let path = context.path(&settings.map);
     let text = std::fs::read_to_string(&path).map_err(|error| ModuleError::at(path.display(), error))?;
     let world =
-        if text.starts_with("type") { World::parse_octile(&text, settings.cell_m, None) } else { World::parse(&text) };
+        if text.starts_with("type") { World::parse_octile(&text, settings.cell_m) } else { World::parse(&text) };
     world.map_err(|error| ModuleError::at(path.display(), error))
 }
 

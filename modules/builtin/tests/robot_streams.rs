@@ -4,22 +4,17 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use rohrpost_builtin as builtin;
-use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Next, Node, Participant, StreamId, StreamReader, node_directory};
-use rohrpost_modules::call::Caller;
-use rohrpost_modules::interface::Proxy;
+use rohrpost_mailbox::{Name, Next, Participant, StreamId, StreamReader};
 use rohrpost_modules::interfaces::{CartographerProxy, MapCounts, PlayerProxy, Progress};
-use rohrpost_modules::runtime::{Start, ToolLink};
 use rohrpost_modules::types::{ImageView, PointCloudView, Pose};
 use rohrpost_robot::camera::{CAMERA, SimulatedCamera};
 use rohrpost_robot::depth::{DEPTH_SENSOR, SimulatedDepth};
 use rohrpost_robot::world::World;
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use support::{Place, wait};
 
-const PATIENCE: Duration = Duration::from_secs(60);
+#[path = "../../tests/support/mod.rs"]
+pub mod support;
+
 const MAP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/building.map");
 const CONFIG: &str = r#"
 installation = "robot-streams-NUMBER"
@@ -40,50 +35,18 @@ tool = { id = 16, text = "By hand" }
 source = "simulation"
 "#;
 
-/// A node with built-in modules, each on a thread of this process; removed when dropped.
-struct Place {
-    installation: Arc<Installation>,
-    node: Arc<Node>,
-    path: PathBuf,
-    _directory: tempfile::TempDir,
-}
-
 impl Place {
-    /// With these modules, in this order, and this log.
+    /// With these built-in modules, in this order, and this log.
     fn with(modules: &str, log: &str) -> Self {
-        static NUMBER: AtomicU32 = AtomicU32::new(0);
-        let number = format!("{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
-        let directory = tempfile::tempdir().unwrap();
-        let file = directory.path().join("robot.toml");
-        std::fs::write(&file, CONFIG.replace("NUMBER", &number) + modules).unwrap();
-        std::fs::write(directory.path().join("robot.log"), log).unwrap();
-        let installation = Arc::new(Installation::load(&file).unwrap_or_else(|errors| panic!("{errors}")));
-        let path = node_directory(&installation.name, "main");
-        let node = Node::create(&path, 0o700).unwrap();
-        Self { installation, node, path, _directory: directory }
+        Self::new(&(CONFIG.to_owned() + modules), &[("robot.log", log.as_bytes())])
     }
 
-    fn name(&self, module: &str) -> Name {
-        self.installation.classes.parse_module(module).unwrap()
-    }
-
-    /// Begins a module, and waits until it is on.
+    /// Begins a module on a thread of this process, and waits until it is on.
     fn start(&self, module: &str, builtin: &'static str) {
         let name = self.name(module);
-        let start = Start { installation: self.installation.clone(), name, launcher: None, restarts: 0, off: false };
+        let start = self.start_of(name);
         std::thread::spawn(move || builtin::run(builtin, start).unwrap().unwrap());
-        let mut tool = self.tool();
-        wait("it starts", || {
-            tool.status(name).ok().filter(|status| status.state == rohrpost_modules::common::State::On)
-        });
-    }
-
-    fn tool(&self) -> ToolLink {
-        ToolLink::join(&self.installation, &self.node, "main", Duration::from_secs(10)).unwrap()
-    }
-
-    fn proxy<P: Proxy>(&self, module: &str) -> P {
-        P::new(&Caller::from(self.tool().link), self.name(module))
+        self.wait_until_on(name, || ());
     }
 
     /// The stream of number 1, from its first record on.
@@ -92,24 +55,6 @@ impl Place {
         let mut reader = participant.stream_reader(StreamId { name: self.name(module), number: 1 }).unwrap();
         reader.seek(0);
         reader
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.path);
-    }
-}
-
-/// Waits until there is something.
-fn wait<R>(what: &str, mut look: impl FnMut() -> Option<R>) -> R {
-    let began = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(began.elapsed() < PATIENCE, "{what}");
-        std::thread::yield_now();
     }
 }
 

@@ -187,8 +187,7 @@ pub enum LookError {
     /// Reader and launch are of different versions.
     #[error(
         "its launch shows nodes in another form ({0:#010x}) than this program reads: use the same version of Rohrpost \
-        on all \
-         nodes (`rohrpost version`)"
+         on all nodes (`rohrpost version`)"
     )]
     Form(u32),
     /// Newer looks took its place; begin anew.
@@ -258,8 +257,7 @@ const NEW_EPOCH: u16 = 22;
 /// }
 /// ```
 pub fn launcher_of(installation: &Installation, node: &str) -> Option<Name> {
-    let instance = installation.node(node)?.launch_instance();
-    Some(Name::new(installation.system.id, installation.classes.tool().0, instance, 0))
+    Some(installation.launch_of(installation.node(node)?))
 }
 
 #[cfg(test)]

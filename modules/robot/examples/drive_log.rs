@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (seed, ticks) = (seed.parse()?, seconds.parse::<u64>()? * 10);
     let map = std::fs::read_to_string(map)?;
     let octile = map.starts_with("type octile");
-    let world = if octile { world::World::parse_octile(&map, 0.5, None)? } else { world::World::parse(&map)? };
+    let world = if octile { world::World::parse_octile(&map, 0.5)? } else { world::World::parse(&map)? };
     let mut robot = simulator::Simulator::new(world, simulator::Settings { seed, ..Default::default() });
     let mut pilot = pilot::Pilot::new(pilot::Settings { seed, ..Default::default() });
     let mut out = std::io::BufWriter::new(std::fs::File::create(log)?);

@@ -81,14 +81,6 @@ pub enum MapError {
     /// No start mark; or no free square at all.
     #[error("nowhere to start: mark one free square with > ^ < or v")]
     NoStart,
-    /// The start that the caller gave is blocked or off the map.
-    #[error("the start at x {x_m} m, y {y_m} m is not free")]
-    StartBlocked {
-        /// Metres.
-        x_m: f64,
-        /// Metres.
-        y_m: f64,
-    },
     /// The size of a square that the caller gave is not a positive number.
     #[error("a square of {0} m")]
     CellSize(f64),
@@ -136,13 +128,13 @@ impl World {
         }
         let cell_m = cell_m.ok_or(MapError::Ended { line: last, missing: "the line `cell_m` and metres" })?;
         let drawn = Drawn::read(last, lines, None, square)?;
-        let (column, row, heading_rad) = drawn.start.ok_or(MapError::NoStart)?;
-        drawn.world(cell_m, |world| Ok(world.pose_in(column, row, heading_rad)))
+        let start = drawn.start.ok_or(MapError::NoStart)?;
+        Ok(drawn.world(cell_m, start))
     }
 
-    /// Reads the grid format of the MovingAI benchmarks. Without a start, the robot starts in the free square nearest
-    /// to the middle, facing along x.
-    pub fn parse_octile(text: &str, cell_m: f64, start: Option<Pose>) -> Result<Self, MapError> {
+    /// Reads the grid format of the MovingAI benchmarks. The robot starts in the free square nearest to the middle,
+    /// facing along x.
+    pub fn parse_octile(text: &str, cell_m: f64) -> Result<Self, MapError> {
         if !(cell_m.is_finite() && cell_m > 0.0) {
             return Err(MapError::CellSize(cell_m));
         }
@@ -158,13 +150,8 @@ impl World {
             None => return Err(MapError::Ended { line: 3, missing: "the line `map`" }),
         };
         let drawn = Drawn::read(last, lines, Some((columns, rows)), octile_square)?;
-        drawn.world(cell_m, |world| match start {
-            Some(pose) if world.is_blocked_at(pose.x_m, pose.y_m) => {
-                Err(MapError::StartBlocked { x_m: pose.x_m, y_m: pose.y_m })
-            }
-            Some(pose) => Ok(pose),
-            None => world.middle().ok_or(MapError::NoStart),
-        })
+        let start = drawn.middle().ok_or(MapError::NoStart)?;
+        Ok(drawn.world(cell_m, start))
     }
 
     /// Where the robot starts.
@@ -219,20 +206,6 @@ impl World {
             _ => true,
         }
     }
-
-    fn pose_in(&self, column: usize, row: usize, heading_rad: f64) -> Pose {
-        Pose { x_m: (column as f64 + 0.5) * self.cell_m, y_m: (row as f64 + 0.5) * self.cell_m, heading_rad }
-    }
-
-    /// The free square nearest to the middle.
-    fn middle(&self) -> Option<Pose> {
-        let free = (0..self.blocked.len()).filter(|index| !self.blocked[*index]);
-        let off_middle = |index: &usize| {
-            let (column, row) = (index % self.columns, index / self.columns);
-            (2 * column + 1).abs_diff(self.columns).pow(2) + (2 * row + 1).abs_diff(self.rows).pow(2)
-        };
-        free.min_by_key(off_middle).map(|index| self.pose_in(index % self.columns, index / self.columns, 0.0))
-    }
 }
 
 /// The place of a cell that is nearest to `place`, along one axis.
@@ -240,12 +213,15 @@ fn nearest(place: f64, cell: i64) -> f64 {
     place.clamp(cell as f64, cell as f64 + 1.0)
 }
 
+/// Column, row and heading.
+type Start = (usize, usize, f64);
+
 /// A map's rows as drawn, lowest first.
 struct Drawn {
     columns: usize,
     rows: usize,
     blocked: Vec<bool>,
-    start: Option<(usize, usize, f64)>,
+    start: Option<Start>,
 }
 
 /// What one character means.
@@ -312,11 +288,21 @@ impl Drawn {
         Self { blocked, start, ..self }
     }
 
-    fn world(self, cell_m: f64, start: impl FnOnce(&World) -> Result<Pose, MapError>) -> Result<World, MapError> {
+    /// The free square nearest to the middle, facing along x.
+    fn middle(&self) -> Option<Start> {
+        let squares = (0..self.blocked.len()).map(|index| (index % self.columns, index / self.columns));
+        let free = squares.zip(&self.blocked).filter_map(|(place, blocked)| (!blocked).then_some(place));
+        let off_middle = |(column, row): &(usize, usize)| {
+            (2 * column + 1).abs_diff(self.columns).pow(2) + (2 * row + 1).abs_diff(self.rows).pow(2)
+        };
+        free.min_by_key(off_middle).map(|(column, row)| (column, row, 0.0))
+    }
+
+    fn world(self, cell_m: f64, (column, row, heading_rad): Start) -> World {
         let Self { columns, rows, blocked, .. } = self;
-        let mut world = World { cell_m, columns, rows, blocked, start: Pose::default() };
-        world.start = start(&world)?;
-        Ok(world)
+        let middle_of = |cell: usize| (cell as f64 + 0.5) * cell_m;
+        let start = Pose { x_m: middle_of(column), y_m: middle_of(row), heading_rad };
+        World { cell_m, columns, rows, blocked, start }
     }
 }
 

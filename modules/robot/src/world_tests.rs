@@ -45,12 +45,8 @@ const OCTILE: &str = "type octile\nheight 3\nwidth 5\nmap\nTT@TT\nT..OT\nTTTTT\n
 
 #[test]
 fn octile_start_is_free() {
-    let world = World::parse_octile(OCTILE, 2.0, None).unwrap();
+    let world = World::parse_octile(OCTILE, 2.0).unwrap();
     assert_eq!(world.start(), Pose { x_m: 5.0, y_m: 3.0, heading_rad: 0.0 }, "the middle itself is free");
-    let left = Pose { x_m: 2.5, y_m: 2.5, heading_rad: 1.0 };
-    assert_eq!(World::parse_octile(OCTILE, 2.0, Some(left)).unwrap().start(), left);
-    let wall = Pose { x_m: 0.5, y_m: 0.5, heading_rad: 1.0 };
-    assert_eq!(World::parse_octile(OCTILE, 2.0, Some(wall)), Err(MapError::StartBlocked { x_m: 0.5, y_m: 0.5 }));
 }
 
 #[test]
@@ -63,9 +59,9 @@ fn bad_octile_maps_say_where() {
         ("type octile\nheight 1\nwidth 2\nmap\nT.T\n", MapError::RowLength { line: 5, found: 3, expected: 2 }),
         ("type octile\nheight 1\nwidth 2\nmap\nTT\n", MapError::NoStart),
     ] {
-        assert_eq!(World::parse_octile(text, 1.0, None), Err(error), "{text:?}");
+        assert_eq!(World::parse_octile(text, 1.0), Err(error), "{text:?}");
     }
-    assert_eq!(World::parse_octile(OCTILE, 0.0, None), Err(MapError::CellSize(0.0)));
+    assert_eq!(World::parse_octile(OCTILE, 0.0), Err(MapError::CellSize(0.0)));
 }
 
 #[test]
@@ -126,6 +122,6 @@ proptest! {
     #[test]
     fn no_text_panics(text in "(rohrpost-map 1\n)?(cell_m [0-9]\n)?(map\n)?[# >v\n]{0,40}") {
         let _ = World::parse(&text);
-        let _ = World::parse_octile(&text, 1.0, None);
+        let _ = World::parse_octile(&text, 1.0);
     }
 }

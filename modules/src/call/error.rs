@@ -175,14 +175,12 @@ fn differs(server: u32) -> String {
     if server <= u16::MAX.into() {
         return format!(
             "the module has common functions of version {server}, this program has {HASH}: run programs of the same \
-             version of \
-             Rohrpost (`rohrpost version`)"
+             version of Rohrpost (`rohrpost version`)"
         );
     }
     format!(
         "interface differs: the module has {server:#010x}; build caller and module from the same version of the \
-         interface \
-         and of Rohrpost (`rohrpost version`)"
+         interface and of Rohrpost (`rohrpost version`)"
     )
 }
 

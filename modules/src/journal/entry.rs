@@ -28,9 +28,7 @@ pub(super) fn append<T: Serialize + ?Sized>(
     content: &T,
 ) -> Result<u32, postcard::Error> {
     let begin = head(to, tag);
-    let mut counted = Counted { bytes: std::mem::take(to) };
-    let written = postcard::serialize_with_flavor::<T, &mut Counted, ()>(content, &mut counted);
-    *to = counted.bytes;
+    let written = postcard::to_io(content, &mut *to).map(drop);
     let sealed = written.and_then(|()| seal(to, begin, before));
     if sealed.is_err() {
         // What fails leaves no half an entry behind.
@@ -70,29 +68,6 @@ pub(super) fn append_raw(to: &mut Vec<u8>, before: u32, tag: Tag, content: &[u8]
     let begin = head(to, tag);
     to.extend_from_slice(content);
     seal(to, begin, before)
-}
-
-/// A vector that postcard writes to; it stays where it is if that fails.
-struct Counted {
-    bytes: Vec<u8>,
-}
-
-impl postcard::ser_flavors::Flavor for &mut Counted {
-    type Output = ();
-
-    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        self.bytes.push(byte);
-        Ok(())
-    }
-
-    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
-        self.bytes.extend_from_slice(bytes);
-        Ok(())
-    }
-
-    fn finalize(self) -> postcard::Result<()> {
-        Ok(())
-    }
 }
 
 /// What is there instead of an entry.

@@ -38,9 +38,8 @@ pub enum StartError {
     /// An interface without a name that it is reached by.
     #[error(
         "the program of `{module}` serves an interface of class `{interface}`, but the module is called {names}: \
-         nobody could call \
-         it, and its data could not be published; give the module a name or an alias of class `{interface}`, or run \
-         another program"
+         nobody could call it, and its data could not be published; give the module a name or an alias of class \
+         `{interface}`, or run another program"
     )]
     Interface {
         /// The module.
@@ -185,8 +184,7 @@ pub enum ContextError {
     /// Data of an interface that the program does not serve under the name that has its class.
     #[error(
         "data `{data}` of an interface of class `{class}` cannot be published as `{module}`: its program does not \
-         serve that \
-         interface there, so nobody could subscribe to it; add it to the module's `Interfaces`"
+         serve that interface there, so nobody could subscribe to it; add it to the module's `Interfaces`"
     )]
     Undeclared {
         /// The data.

@@ -40,15 +40,13 @@ impl<M: MadeModule> Running<M> {
             JournalEvent::On => drop(self.life.turn_on(&mut self.context)),
             JournalEvent::Off => self.life.turn_off(&mut self.context),
             JournalEvent::Tick => {
-                let result = self.life.work(JournalEvent::Tick, &mut self.context, M::tick);
-                self.life.check(result, &mut self.context);
+                self.life.attempt(JournalEvent::Tick, &mut self.context, M::tick);
             }
             JournalEvent::Received { value, .. } => {
                 let value = self.context.journal.bytes(value);
                 let Some(received) = Received::of(event, &value) else { return };
                 let part = |module: &mut M, context: &mut Context| module.received(context, &received);
-                let result = self.life.work(*event, &mut self.context, part);
-                self.life.check(result, &mut self.context);
+                self.life.attempt(*event, &mut self.context, part);
             }
             JournalEvent::Function { endpoint, number, arguments } => {
                 let mut reply = Vec::new();
@@ -62,8 +60,7 @@ impl<M: MadeModule> Running<M> {
             JournalEvent::Ready { watch, readable, writable } => {
                 let ready = Ready { watch: Watch::from_number(watch), readable, writable };
                 let part = |module: &mut M, context: &mut Context| module.ready(context, ready);
-                let result = self.life.work(*event, &mut self.context, part);
-                self.life.check(result, &mut self.context);
+                self.life.attempt(*event, &mut self.context, part);
             }
         }
     }

@@ -87,7 +87,7 @@ impl ToolLink {
         let participant = Participant::join(node, Name::NONE)?;
         let tool = |instance| Name::new(installation.system.id, installation.classes.tool().0, instance, 0);
         for instance in config.tools_by_hand() {
-            match Self::take(&participant, tool(instance), tool(config.launch_instance()), timeout) {
+            match Self::take(&participant, tool(instance), installation.launch_of(config), timeout) {
                 Err(CreateError::Owned(..)) => {}
                 taken => return Ok(taken?),
             }
@@ -108,7 +108,7 @@ impl ToolLink {
     ) -> Result<Self, ClientError> {
         let config = installation.node(name).ok_or_else(|| ClientError::NoNode(name.into()))?;
         let participant = Participant::join(node, Name::NONE)?;
-        let me = Name::new(installation.system.id, installation.classes.tool().0, config.launch_instance(), 0);
+        let me = installation.launch_of(config);
         Ok(Self::take(&participant, me, me, timeout)?)
     }
 

@@ -147,8 +147,14 @@ impl<M: MadeModule> Incarnation<M> {
         }
     }
 
-    pub(super) fn check(&mut self, result: Result<(), ModuleError>, context: &mut Context) {
-        if let Err(error) = result {
+    /// As [`Self::work`], of a part that may fail: then the module is in error.
+    pub(super) fn attempt(
+        &mut self,
+        event: JournalEvent<'_>,
+        context: &mut Context,
+        part: impl FnOnce(&mut M, &mut Context) -> Result<(), ModuleError>,
+    ) {
+        if let Err(error) = self.work(event, context, part) {
             self.fail(&error, context);
         }
     }

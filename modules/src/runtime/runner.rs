@@ -120,8 +120,7 @@ impl<M: MadeModule> Running<M> {
                         let received = record.received();
                         let part = |module: &mut M, context: &mut Context| module.received(context, &received);
                         let event = received.event(&self.context.journal);
-                        let result = self.life.work(event, &mut self.context, part);
-                        self.life.check(result, &mut self.context);
+                        self.life.attempt(event, &mut self.context, part);
                         true
                     }
                     Step::Again => true,
@@ -144,8 +143,7 @@ impl<M: MadeModule> Running<M> {
         }
         let moment = self.context.deliver_due();
         if self.life.state == ModuleState::On && self.context.schedule.take_tick(moment) {
-            let result = self.life.work(JournalEvent::Tick, &mut self.context, M::tick);
-            self.life.check(result, &mut self.context);
+            self.life.attempt(JournalEvent::Tick, &mut self.context, M::tick);
         }
     }
 
@@ -168,8 +166,7 @@ impl<M: MadeModule> Running<M> {
             let Ready { watch, readable, writable } = ready;
             let event = JournalEvent::Ready { watch: watch.number(), readable, writable };
             let part = |module: &mut M, context: &mut Context| module.ready(context, ready);
-            let result = self.life.work(event, &mut self.context, part);
-            self.life.check(result, &mut self.context);
+            self.life.attempt(event, &mut self.context, part);
         }
     }
 
@@ -259,8 +256,7 @@ fn take<M: MadeModule>(mailbox: &mut Receiver, life: &mut Incarnation<M>, contex
             let origin = Origin::Package { mailbox: local, id: head.id };
             let received = Received::new(head.from, number, origin, data, value);
             let part = |module: &mut M, context: &mut Context| module.received(context, &received);
-            let result = life.work(received.event(&context.journal), context, part);
-            life.check(result, context);
+            life.attempt(received.event(&context.journal), context, part);
         }
         true
     })

@@ -1,9 +1,10 @@
 //! Streams of which a module is given each record.
 
-use super::puppets::{CAMERA, CameraInterface, Eye, Place, Puppeteer, T, VIEWER, Watcher, picture, wait};
+use super::puppets::{CAMERA, CameraInterface, Eye, Picture, Puppeteer, T, VIEWER, Watcher, picture};
+use super::support::{Place, wait};
 use rohrpost_mailbox::local;
 use rohrpost_modules::interface::StreamPort;
-use rohrpost_modules::runtime::{Moment, Rate};
+use rohrpost_modules::runtime::{Context, Moment, Rate, StreamSubscription};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -35,6 +36,40 @@ fn follows(viewer: &Puppeteer<Watcher>, pause: impl Fn() + Send + 'static) -> Se
     seen
 }
 
+/// Has the viewer note the pictures that come; `then` is done with their subscription.
+fn follows_images(
+    viewer: &Puppeteer<Watcher>,
+    then: impl FnOnce(&mut Watcher, &mut Context, &StreamSubscription<Picture>) + Send + 'static,
+) -> Seen {
+    let seen = Seen::default();
+    let noted = seen.clone();
+    viewer.does(move |part, context| {
+        let images = context.subscribe_stream(CameraInterface::IMAGE, "camera.0").unwrap();
+        then(part, context, &images);
+        part.handler = Some(Box::new(move |data| {
+            let image = data.read(&images)?.unwrap();
+            noted.lock().unwrap().push((image.width_px, data.head.sequence, data.head.missed));
+            Ok(())
+        }));
+    });
+    seen
+}
+
+/// Of a camera that was started again at its fourth picture, a viewer that rewinds so sees all from this one on.
+fn rewound_from(rewind: fn(&mut Context, &StreamSubscription<Picture>), first: u32) {
+    let place = Place::with("");
+    let camera = place.start::<Eye>(CAMERA);
+    shoots(&camera, 0..3);
+    camera.crashes();
+    let camera = place.start::<Eye>(CAMERA);
+    shoots(&camera, 3..6);
+    let viewer = place.start::<Watcher>(VIEWER);
+    let seen = follows_images(&viewer, move |_, context, images| rewind(context, images));
+    shoots(&camera, 6..7);
+    wait("it sees the last", || (widths(&seen).last() == Some(&6)).then_some(()));
+    assert_eq!(*seen.lock().unwrap(), (first..7).map(|n| (n, n, 0)).collect::<Vec<_>>());
+}
+
 /// Pictures of these widths, in this order, all with time to spare.
 fn shoots(camera: &Puppeteer<Eye>, widths: std::ops::Range<u32>) {
     camera.does(move |_, context| {
@@ -44,7 +79,7 @@ fn shoots(camera: &Puppeteer<Eye>, widths: std::ops::Range<u32>) {
     });
 }
 
-fn port() -> StreamPort<super::puppets::Picture> {
+fn port() -> StreamPort<Picture> {
     CameraInterface::IMAGE
 }
 
@@ -130,69 +165,19 @@ fn a_restarted_writer_is_followed() {
 
 #[test]
 fn a_stream_can_be_followed_from_the_oldest_record_of_its_present_writer() {
-    let place = Place::with("");
-    let camera = place.start::<Eye>(CAMERA);
-    shoots(&camera, 0..3);
-    camera.crashes();
-    let camera = place.start::<Eye>(CAMERA);
-    shoots(&camera, 3..6);
-    let viewer = place.start::<Watcher>(VIEWER);
-    let seen = Seen::default();
-    let noted = seen.clone();
-    viewer.does(move |part, context| {
-        let images = context.subscribe_stream(CameraInterface::IMAGE, "camera.0").unwrap();
-        context.rewind(&images);
-        part.handler = Some(Box::new(move |data| {
-            let image = data.read(&images)?.unwrap();
-            noted.lock().unwrap().push((image.width_px, data.head.sequence, data.head.missed));
-            Ok(())
-        }));
-    });
-    shoots(&camera, 6..7);
-    wait("it sees the last", || (widths(&seen).last() == Some(&6)).then_some(()));
-    assert_eq!(*seen.lock().unwrap(), (3..7).map(|n| (n, n, 0)).collect::<Vec<_>>());
+    rewound_from(|context, images| context.rewind(images), 3);
 }
 
 #[test]
 fn a_stream_can_be_followed_from_any_record_that_is_kept_also_of_earlier_writers() {
-    let place = Place::with("");
-    let camera = place.start::<Eye>(CAMERA);
-    shoots(&camera, 0..3);
-    camera.crashes();
-    let camera = place.start::<Eye>(CAMERA);
-    shoots(&camera, 3..6);
-    let viewer = place.start::<Watcher>(VIEWER);
-    let seen = Seen::default();
-    let noted = seen.clone();
-    viewer.does(move |part, context| {
-        let images = context.subscribe_stream(CameraInterface::IMAGE, "camera.0").unwrap();
-        context.rewind_to(&images, 2);
-        part.handler = Some(Box::new(move |data| {
-            let image = data.read(&images)?.unwrap();
-            noted.lock().unwrap().push((image.width_px, data.head.sequence, data.head.missed));
-            Ok(())
-        }));
-    });
-    shoots(&camera, 6..7);
-    wait("it sees the last", || (widths(&seen).last() == Some(&6)).then_some(()));
-    assert_eq!(*seen.lock().unwrap(), (2..7).map(|n| (n, n, 0)).collect::<Vec<_>>());
+    rewound_from(|context, images| context.rewind_to(images, 2), 2);
 }
 
 #[test]
 fn what_is_rewound_while_it_is_received_comes_again_and_passes_no_module_by() {
     let place = Place::with("");
     let (camera, viewer) = (place.start::<Eye>(CAMERA), place.start::<Watcher>(VIEWER));
-    let seen = Seen::default();
-    let noted = seen.clone();
-    viewer.does(move |part, context| {
-        let images = context.subscribe_stream(CameraInterface::IMAGE, "camera.0").unwrap();
-        part.handler = Some(Box::new(move |data| {
-            let image = data.read(&images)?.unwrap();
-            noted.lock().unwrap().push((image.width_px, data.head.sequence, data.head.missed));
-            Ok(())
-        }));
-        part.rewinds = Some(images);
-    });
+    let seen = follows_images(&viewer, |part, _, images| part.rewinds = Some(*images));
     // Rewound behind the first one.
     shoots(&camera, 0..1);
     wait("it sees the first twice", || (widths(&seen) == [0, 0]).then_some(()));

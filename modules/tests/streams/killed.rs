@@ -1,12 +1,13 @@
 //! A writer in a process of its own that is killed again and again, and ends in the end.
 
-use super::puppets::{CAMERA, Camera, CameraInterface, PATIENCE, Picture, Place, VIEWER, Watcher, picture, wait};
+use super::puppets::{CAMERA, Camera, CameraInterface, Picture, VIEWER, Watcher, picture};
+use super::support::{PATIENCE, Place, play, process, wait};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost_mailbox::{Next, StreamId};
-use rohrpost_modules::runtime::{Context, Start, Stream, run_started};
+use rohrpost_modules::runtime::{Context, Stream};
 use rohrpost_modules::{Module, ModuleError};
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::time::Duration;
 
 const KILLS: usize = 10;
@@ -34,19 +35,11 @@ impl Module for Shooter {
 /// Not a test of its own: the writer's process comes here.
 #[test]
 fn role() {
-    let Ok(file) = std::env::var("ROHRPOST_TEST_CONFIG") else { return };
-    let words = ["--config", &file, "--name", "camera.0"].map(String::from);
-    run_started::<Shooter>(Start::from_arguments(words.into_iter()).unwrap()).unwrap();
+    play::<Shooter>("camera.0");
 }
 
 fn shooter(place: &Place) -> Child {
-    Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "killed::role", "--test-threads=1"])
-        .env("ROHRPOST_TEST_CONFIG", &place.installation.path)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap()
+    process("killed::role", &place.installation.path)
 }
 
 #[test]

@@ -8,4 +8,6 @@ mod killed;
 mod puppets;
 mod reading;
 mod refusing;
+#[path = "../support/mod.rs"]
+pub mod support;
 mod writing;

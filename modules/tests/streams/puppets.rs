@@ -1,25 +1,20 @@
 //! Modules that do what a test gives them, and their interfaces.
 
-use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, node_directory};
-use rohrpost_modules::call::Caller;
-use rohrpost_modules::common::State;
+use super::support::{PATIENCE, Place};
+use rohrpost_mailbox::Name;
 use rohrpost_modules::interface;
-use rohrpost_modules::runtime::{Context, Received, Start, StartError, StreamSubscription, ToolLink, run_started};
+use rohrpost_modules::runtime::{Context, Received, StartError, StreamSubscription, run_started};
 use rohrpost_modules::schema::{Bytes, Schema, View};
 use rohrpost_modules::types::Pose;
 use rohrpost_modules::{Module, ModuleError};
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 /// System time in these tests, ns: that of a million seconds.
 pub(crate) const T: u64 = 1_000_000_000_000_000;
 pub(crate) const CAMERA: Name = Name::new(1, 150, 0, 0);
@@ -161,14 +156,6 @@ impl Part for OtherEye {
 impl Camera for Puppet<Eye> {}
 impl OtherCamera for Puppet<OtherEye> {}
 
-/// A node with its configuration; removed when dropped.
-pub(crate) struct Place {
-    pub(crate) installation: Arc<Installation>,
-    pub(crate) node: Arc<Node>,
-    path: PathBuf,
-    _directory: tempfile::TempDir,
-}
-
 const CONFIG: &str = r#"
 installation = "streams-NUMBER"
 [system]
@@ -211,15 +198,7 @@ optional = true
 impl Place {
     /// With these sections of streams of the camera.
     pub(crate) fn with(streams: &str) -> Self {
-        static NUMBER: AtomicU32 = AtomicU32::new(0);
-        let number = format!("{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
-        let directory = tempfile::tempdir().unwrap();
-        let file = directory.path().join("streams.toml");
-        std::fs::write(&file, CONFIG.replace("NUMBER", &number).replace("STREAMS", streams)).unwrap();
-        let installation = Arc::new(Installation::load(&file).unwrap());
-        let path = node_directory(&installation.name, "main");
-        let node = Node::create(&path, 0o700).unwrap();
-        Self { installation, node, path, _directory: directory }
+        Self::new(&CONFIG.replace("STREAMS", streams), &[])
     }
 
     /// Begins a module, and hands it out when it is on.
@@ -228,16 +207,11 @@ impl Place {
         Puppet<P>: Module,
     {
         let mut puppet = self.begin(name);
-        let mut tool = self.tool();
-        let began = Instant::now();
-        while !tool.status(name).is_ok_and(|status| status.state == State::On) {
-            assert!(began.elapsed() < PATIENCE, "it does not start");
+        self.wait_until_on(name, || {
             if puppet.thread.as_ref().is_some_and(JoinHandle::is_finished) {
                 panic!("it ended: {:?}", puppet.ended());
             }
-            std::thread::yield_now();
-        }
-        tool.close();
+        });
         puppet
     }
 
@@ -248,19 +222,9 @@ impl Place {
     {
         let (orders, receiver) = channel();
         ORDERS.lock().unwrap().insert((self.installation.name.clone(), name.raw()), receiver);
-        let installation = self.installation.clone();
-        let start = Start { installation, name, launcher: None, restarts: 0, off: false };
+        let start = self.start_of(name);
         let thread = Some(std::thread::spawn(move || run_started::<Puppet<P>>(start)));
         Puppeteer { orders, thread, part: std::marker::PhantomData }
-    }
-
-    pub(crate) fn tool(&self) -> ToolLink {
-        ToolLink::join(&self.installation, &self.node, "main", Duration::from_secs(10)).unwrap()
-    }
-
-    /// A link that proxies are made of.
-    pub(crate) fn caller(&self) -> Caller {
-        self.tool().link.into()
     }
 
     /// Values that the camera has published under this number, as tools count them.
@@ -268,12 +232,6 @@ impl Place {
         let kind = rohrpost_mailbox::Type::data(number);
         let rows = self.node.traffic();
         rows.iter().filter(|row| row.is_publication() && row.kind == kind).map(|row| row.packages).sum()
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.path);
     }
 }
 
@@ -311,17 +269,5 @@ impl<P: Part> Puppeteer<P> {
     pub(crate) fn crashes(mut self) {
         self.send(|_, _| panic!("as the test wants it"));
         assert!(self.thread.take().unwrap().join().is_err());
-    }
-}
-
-/// Waits until there is something.
-pub(crate) fn wait<R>(what: &str, mut look: impl FnMut() -> Option<R>) -> R {
-    let began = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(began.elapsed() < PATIENCE, "{what}");
-        std::thread::yield_now();
     }
 }

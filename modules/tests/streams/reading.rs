@@ -1,6 +1,7 @@
 //! Streams that a module looks at when it likes.
 
-use super::puppets::{CAMERA, CameraInterface, Eye, Place, Puppeteer, T, VIEWER, Watcher, picture};
+use super::puppets::{CAMERA, CameraInterface, Eye, Puppeteer, T, VIEWER, Watcher, picture};
+use super::support::{PATIENCE, Place};
 use rohrpost_mailbox::{Around, Name, Next, TimeKeeper, TimeSource};
 use rohrpost_modules::description::noted;
 use rohrpost_modules::fusion::{NoValue, Stamp};
@@ -93,7 +94,7 @@ fn a_restarted_writer_is_read_on_without_a_gap() {
     assert_eq!(next_x_m(&mut places), Next::Nothing);
     let camera = place.start::<Eye>(CAMERA);
     moves(&camera, &[30]);
-    let Next::Record(record) = places.next_within(super::puppets::PATIENCE).unwrap() else { panic!("it was written") };
+    let Next::Record(record) = places.next_within(PATIENCE).unwrap() else { panic!("it was written") };
     assert_eq!((record.info().sequence, record.read().unwrap().x_m), (2, 30.0));
     drop(record);
     assert_eq!(places.accounts(), (3, 0));

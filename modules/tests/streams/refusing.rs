@@ -1,8 +1,7 @@
 //! What is refused, and how it says so.
 
-use super::puppets::{
-    CAMERA, CameraInterface, Eye, OtherCameraInterface, OtherEye, Place, T, VIEWER, Watcher, picture,
-};
+use super::puppets::{CAMERA, CameraInterface, Eye, OtherCameraInterface, OtherEye, T, VIEWER, Watcher, picture};
+use super::support::Place;
 use rohrpost_mailbox::{Name, Participant, StreamId, StreamShape};
 use rohrpost_modules::interface::StreamPort;
 use rohrpost_modules::runtime::{Context, StartError};

@@ -1,6 +1,7 @@
 //! What a module writes, and what others get of it.
 
-use super::puppets::{CAMERA, CameraInterface, CameraProxy, Eye, PATIENCE, Place, T, VIEWER, Watcher, picture};
+use super::puppets::{CAMERA, CameraInterface, CameraProxy, Eye, T, VIEWER, Watcher, picture};
+use super::support::{PATIENCE, Place};
 use rohrpost_mailbox::{Next, StreamId, local};
 use rohrpost_modules::call::{CallError, Fault, append};
 use rohrpost_modules::common::{DataHead, SUBSCRIBE, Subscribe};

@@ -3,22 +3,22 @@
 
 #[path = "../../../benches/src/counting.rs"]
 pub mod counting;
+#[path = "../support/mod.rs"]
+pub mod support;
 
 use counting::{CountingHeap, heap_uses};
-use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, node_directory};
-use rohrpost_modules::call::Caller;
+use rohrpost_mailbox::Name;
 use rohrpost_modules::interface::Proxy;
 use rohrpost_modules::interfaces::MotorProxy;
-use rohrpost_modules::runtime::{Start, ToolLink, run_started};
+use rohrpost_modules::runtime::run_started;
 use rohrpost_modules::types::Pose;
 use rohrpost_modules::{Module, interface};
 use std::io::Write;
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use support::{PATIENCE, Place};
 
 #[global_allocator]
 static HEAP: CountingHeap = CountingHeap;
@@ -79,37 +79,18 @@ pub fn port() -> std::io::Result<UnixStream> {
 pub struct Hosted {
     /// Calls it.
     pub motor: MotorProxy,
-    /// Of its node.
-    pub path: PathBuf,
-    /// Of its configuration.
-    _directory: tempfile::TempDir,
-}
-
-impl Drop for Hosted {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.path);
-    }
+    /// Where it runs.
+    pub place: Place,
 }
 
 /// Starts it, as `motor.0` of an installation with this in its file too.
 pub fn host<M: Module>(name: &str, more: &str) -> Hosted {
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("warm.toml");
-    std::fs::write(&file, format!("installation = \"{name}-{}\"{CONFIG}{more}", std::process::id())).unwrap();
-    let installation = Arc::new(Installation::load(&file).unwrap());
-    let start = Start { installation: installation.clone(), name: MOTOR, launcher: None, restarts: 0, off: false };
+    let place = Place::new(&format!("installation = \"{name}-NUMBER\"{CONFIG}{more}"), &[]);
+    let start = place.start_of(MOTOR);
     let module = std::thread::spawn(move || run_started::<M>(start));
-
-    let path = node_directory(&installation.name, "main");
-    let node = Node::create(&path, 0o700).unwrap();
-    let mut tool = ToolLink::join(&installation, &node, "main", Duration::from_secs(5)).unwrap();
-    let began = Instant::now();
-    while tool.status(MOTOR).is_err() {
-        assert!(began.elapsed() < Duration::from_secs(60) && !module.is_finished(), "it does not start");
-        std::thread::yield_now();
-    }
-    let motor = MotorProxy::new(&Caller::from(tool.link), MOTOR).with_timeout(Duration::from_secs(5));
-    Hosted { motor, path, _directory: directory }
+    place.wait_until_on(MOTOR, || assert!(!module.is_finished(), "it does not start"));
+    let motor = MotorProxy::new(&place.caller(), MOTOR).with_timeout(Duration::from_secs(5));
+    Hosted { motor, place }
 }
 
 /// Calls, and writes to its descriptor, until there were so many ticks more and so many data received; all uses of the
@@ -126,7 +107,7 @@ pub fn work(motor: &MotorProxy, ticks: u64, received: u64, mut call: impl FnMut(
         let written = FAR.lock().unwrap().as_mut().unwrap().write(b"x").unwrap();
         WRITTEN.fetch_add(written as u64, Ordering::Relaxed);
         call(motor);
-        assert!(began.elapsed() < Duration::from_secs(60), "it does not tick, or receives nothing");
+        assert!(began.elapsed() < PATIENCE, "it does not tick, or receives nothing");
     }
     let uses = USES.load(Ordering::Relaxed);
     assert!(uses > 0, "it counts");

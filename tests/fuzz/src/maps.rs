@@ -4,7 +4,7 @@ use rohrpost_robot::world::{MapError, World};
 
 pub(crate) fn run(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    for read in [World::parse(text), World::parse_octile(text, 0.2, None)] {
+    for read in [World::parse(text), World::parse_octile(text, 0.2)] {
         match read {
             Ok(world) => look_around(&world),
             Err(error) => told(&error, text),
@@ -21,7 +21,7 @@ fn told(error: &MapError, text: &str) {
         | MapError::RowLength { line, .. }
         | MapError::TooLarge { line }
         | MapError::SecondStart { line } => *line,
-        MapError::NotThisFormat(_) | MapError::NoStart | MapError::StartBlocked { .. } | MapError::CellSize(_) => 1,
+        MapError::NotThisFormat(_) | MapError::NoStart | MapError::CellSize(_) => 1,
     };
     assert!((1..=text.lines().count().max(1)).contains(&line), "{error}");
 }

@@ -48,7 +48,7 @@ impl Launch {
         for index in 0..self.children.len() {
             self.switch_on(index);
             while self.calls[index].switch.is_some() {
-                let turned = self.turn(0..self.children.len(), Duration::MAX, index);
+                let turned = self.turn(0..self.children.len(), index);
                 self.switch_on(index);
                 // A launch that is told to stop after the last answer has started, and stops as such.
                 if self.calls[index].switch.is_some() {
@@ -74,7 +74,7 @@ impl Launch {
                 _ if !child.is_required() && child.restarts() > 0 => return Ok(false),
                 Phase::Starting | Phase::Waiting | Phase::Stopping => {}
             }
-            self.turn(0..index + 1, Duration::MAX, index)?;
+            self.turn(0..index + 1, index)?;
         }
     }
 
@@ -107,7 +107,7 @@ impl Launch {
             if work.iter().all(|index| phase(index) == Phase::Failed) {
                 return Err(not_ready(&self.children[first], self.children[first].last_end()));
             }
-            self.turn(0..self.children.len(), Duration::MAX, first)?;
+            self.turn(0..self.children.len(), first)?;
         }
     }
 
@@ -134,8 +134,7 @@ impl Launch {
         (!ordinary.is_empty()).then(|| {
             format!(
                 "no real time: {} run{} like ordinary programs, and late when the computer is busy; allow it with a \
-                limit \
-                 `rtprio` for this user (limits.conf) or CAP_SYS_NICE (`rohrpost doctor` says what is missing)",
+                 limit `rtprio` for this user (limits.conf) or CAP_SYS_NICE (`rohrpost doctor` says what is missing)",
                 ordinary.join(", "),
                 if ordinary.len() == 1 { "s" } else { "" }
             )
@@ -143,8 +142,8 @@ impl Launch {
     }
 
     /// Sleeps until something happens, then looks after those children that were started, and answers tools.
-    fn turn(&mut self, started: Range<usize>, period: Duration, index: usize) -> Result<(), LaunchError> {
-        self.sleep(started.clone(), period);
+    fn turn(&mut self, started: Range<usize>, index: usize) -> Result<(), LaunchError> {
+        self.sleep(started.clone(), Duration::MAX);
         if self.bell.words() > 0 {
             return Err(not_ready(&self.children[index], "told to stop"));
         }

@@ -1,7 +1,7 @@
 //! The functions that all modules have, as a tool calls them.
 
 use super::{ToolLink, describe};
-use crate::call::{CallError, append};
+use crate::call::CallError;
 use crate::common::{
     self, Change, Exchange, ExchangePage, OutputLevel, ParameterPage, SetParameters, Status, TimeReport,
 };
@@ -161,9 +161,7 @@ impl ToolLink {
         let mut reads = 0;
         loop {
             let from = found.len() as u16;
-            let write = |body: &mut Vec<u8>| append(body, &(from,));
-            let page: ParameterPage =
-                self.call(module, common::PARAMETERS, common::HASH, write, |bytes| postcard::from_bytes(bytes))?;
+            let page: ParameterPage = self.common(module, common::PARAMETERS, &(from,))?;
             // What it says of itself is a claim.
             if page.total > PARAMETERS_MAX {
                 let text = format!("its {} parameters are more than {PARAMETERS_MAX}", page.total);

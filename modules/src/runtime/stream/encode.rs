@@ -3,6 +3,7 @@
 use postcard::ser_flavors::{Flavor, Size};
 use rohrpost_schema::{Members, Type};
 use serde::Serialize;
+use std::ops::Range;
 
 /// Bytes of the longest length, 7 bits in each.
 const LENGTH_BYTES_MAX: usize = usize::BITS.div_ceil(7) as usize;
@@ -28,40 +29,32 @@ pub(super) fn put<T: Serialize>(value: &T, body: &mut [u8]) -> Result<usize, Enc
 
 /// Writes a value of which the last field is bytes, and empty, with `len` bytes there; where they lie. What they are
 /// stays open.
-pub(super) fn put_open<T: Serialize>(
-    value: &T,
-    len: usize,
-    body: &mut [u8],
-) -> Result<std::ops::Range<usize>, EncodeError> {
-    let max = body.len();
-    let mut length = [0; LENGTH_BYTES_MAX];
-    let length = postcard::to_slice(&len, &mut length).map_err(EncodeError::Postcard)?;
+pub(super) fn put_open<T: Serialize>(value: &T, len: usize, body: &mut [u8]) -> Result<Range<usize>, EncodeError> {
+    let front = postcard::serialize_with_flavor(value, Front { body: &mut *body, at: 0, ended_empty: false });
     // In place of the length 0.
-    let more = (length.len() - 1).saturating_add(len);
-    let front = postcard::serialize_with_flavor(value, Front { body, at: 0, ended_empty: false })
-        .map_err(|error| explain(value, more, error))?
-        .ok_or(EncodeError::NotEmpty)?;
-    let from = front.len + length.len();
-    let end = from.saturating_add(len);
-    if end > max {
-        return Err(EncodeError::TooLarge(end));
-    }
-    front.rest[..length.len()].copy_from_slice(length);
-    Ok(from..end)
+    let more = || postcard::serialize_with_flavor(&len, Size::default()).map_or(0, |bytes| bytes - 1);
+    let front = front.map_err(|error| explain(value, more().saturating_add(len), error))?;
+    open_behind(front.ok_or(EncodeError::NotEmpty)?, len, body)
 }
 
 /// The same of a value that is postcard already.
-pub(super) fn put_open_bytes(value: &[u8], len: usize, body: &mut [u8]) -> Result<std::ops::Range<usize>, EncodeError> {
+pub(super) fn put_open_bytes(value: &[u8], len: usize, body: &mut [u8]) -> Result<Range<usize>, EncodeError> {
     let [front @ .., 0] = value else { return Err(EncodeError::NotEmpty) };
+    let room = open_behind(front.len(), len, body)?;
+    body[..front.len()].copy_from_slice(front);
+    Ok(room)
+}
+
+/// Puts a length behind so many bytes; where these bytes are to lie.
+fn open_behind(front: usize, len: usize, body: &mut [u8]) -> Result<Range<usize>, EncodeError> {
     let mut length = [0; LENGTH_BYTES_MAX];
     let length = postcard::to_slice(&len, &mut length).map_err(EncodeError::Postcard)?;
-    let from = front.len() + length.len();
+    let from = front + length.len();
     let end = from.saturating_add(len);
     if end > body.len() {
         return Err(EncodeError::TooLarge(end));
     }
-    body[..front.len()].copy_from_slice(front);
-    body[front.len()..from].copy_from_slice(length);
+    body[front..from].copy_from_slice(length);
     Ok(from..end)
 }
 
@@ -96,15 +89,9 @@ struct Front<'b> {
     ended_empty: bool,
 }
 
-/// What was written but for the length 0 at its end, and the room behind it.
-struct Written<'b> {
-    len: usize,
-    rest: &'b mut [u8],
-}
-
-impl<'b> Flavor for Front<'b> {
-    /// None when the last thing was something else.
-    type Output = Option<Written<'b>>;
+impl Flavor for Front<'_> {
+    /// Bytes but for the length 0 at the end; none when the last thing was something else.
+    type Output = Option<usize>;
 
     fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
         self.try_extend(&[byte])
@@ -119,8 +106,7 @@ impl<'b> Flavor for Front<'b> {
     }
 
     fn finalize(self) -> postcard::Result<Self::Output> {
-        let Some(len) = self.at.checked_sub(1).filter(|_| self.ended_empty) else { return Ok(None) };
-        Ok(Some(Written { len, rest: &mut self.body[len..] }))
+        Ok(self.at.checked_sub(1).filter(|_| self.ended_empty))
     }
 }
 

@@ -10,6 +10,7 @@ use crate::runtime::newest::Published;
 use rohrpost_mailbox::{OpenRecord, RecordPlace, StreamWriter, SuspendedRecord};
 use rohrpost_schema::Data;
 use std::marker::PhantomData;
+use std::ops::Range;
 
 /// A value of a stream that is being written in place; readers do not see it. Dropped before
 /// [`OpenValue::finish`], nothing happened.
@@ -111,13 +112,7 @@ impl<'a, T: Data> OpenValue<'a, T> {
     /// [`RecordError::TooLarge`], [`RecordError::Encode`], and [`RecordError::NotEmpty`] when its type has no such
     /// field at its end, or there are bytes in it.
     pub fn fill(&mut self, value: &T, len: usize) -> Result<&mut [u8], ContextError> {
-        let put = match self.about.item.ends_with_bytes {
-            true => encode::put_open(value, len, self.record.body_mut()),
-            false => Err(EncodeError::NotEmpty),
-        };
-        let room = put.map_err(|error| self.explain(error))?;
-        self.len = Some(room.end);
-        Ok(&mut self.record.body_mut()[room])
+        self.fill_room(|body| encode::put_open(value, len, body))
     }
 
     /// As [`OpenValue::fill`]; the value, of which the last field is empty, is postcard already.
@@ -125,8 +120,15 @@ impl<'a, T: Data> OpenValue<'a, T> {
     /// # Errors
     /// As for [`OpenValue::fill`].
     pub fn fill_bytes(&mut self, value: &[u8], len: usize) -> Result<&mut [u8], ContextError> {
+        self.fill_room(|body| encode::put_open_bytes(value, len, body))
+    }
+
+    fn fill_room(
+        &mut self,
+        put: impl FnOnce(&mut [u8]) -> Result<Range<usize>, EncodeError>,
+    ) -> Result<&mut [u8], ContextError> {
         let put = match self.about.item.ends_with_bytes {
-            true => encode::put_open_bytes(value, len, self.record.body_mut()),
+            true => put(self.record.body_mut()),
             false => Err(EncodeError::NotEmpty),
         };
         let room = put.map_err(|error| self.explain(error))?;
