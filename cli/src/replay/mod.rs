@@ -41,7 +41,6 @@ use rohrpost::wire::append;
 use rohrpost_config::{Installation, StreamSpec};
 use rohrpost_launch::{Launch, events};
 use session::ReplaySession;
-use settings::WantedCourse;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -249,17 +248,16 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         let runs = |name: &str| arguments.run.iter().any(|run| run == name);
         std::fs::write(&saved, saved_of(&text, runs)?)?;
     }
-    let course = WantedCourse { part: &arguments.part, rate: arguments.rate, repeats: arguments.repeats };
-    let mut settings = settings::made(&course, recorded, &played, folder)?;
+    let mut settings = settings::made(arguments, recorded, &played, folder)?;
     match noted_answers(recorded, &source, &played, folder) {
         Ok(None) => {}
         Ok(Some(answers)) => {
             std::fs::write(folder.join(ANSWERS), answers)?;
-            settings.insert("answers".into(), ANSWERS.into());
+            settings.answers = Some(ANSWERS.into());
         }
         Err(error) => complain(format_args!("commands are not answered, as the journals cannot be read: {error}")),
     }
-    let (text, player) = wish.text(&played, settings)?;
+    let (text, player) = wish.text(&played, toml::Table::try_from(settings)?)?;
     let path = folder.join(CONFIG);
     std::fs::write(&path, text)?;
     let named =

@@ -1,23 +1,22 @@
 //! The settings of the player: `rohrpost replay` writes them into the configuration of its node.
 
+use super::Arguments;
 use super::configuration::PlayedModules;
 use super::recorded::RecordedFiles;
-use crate::record::PartArguments;
 use crate::terminal::{Failure, say};
 use rohrpost_recording::Selection;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use toml::{Table, Value};
 
 /// A round takes so long at least, also if what is repeated is shorter: rounds of no length would take a processor.
 pub(super) const ROUND_MIN: Duration = Duration::from_millis(100);
 
 /// What `rohrpost replay` writes into the configuration of its node.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct PlayerSettings {
     /// The recording, in order.
@@ -43,7 +42,7 @@ pub(super) struct PlayerSettings {
 
 /// Where a recording is. Names of files are bytes, and configurations are texts: of a name that is no text they have
 /// the numbers of its bytes.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(untagged)]
 pub(super) enum RecordingPath {
     Text(String),
@@ -65,43 +64,24 @@ impl From<RecordingPath> for PathBuf {
     }
 }
 
-impl From<RecordingPath> for Value {
-    fn from(path: RecordingPath) -> Self {
-        match path {
-            RecordingPath::Text(text) => text.into(),
-            RecordingPath::Bytes(bytes) => bytes.into_iter().map(i64::from).collect::<Vec<_>>().into(),
-        }
-    }
-}
-
-/// What the command line says of the course.
-pub(super) struct WantedCourse<'a> {
-    pub(super) part: &'a PartArguments,
-    pub(super) rate: f64,
-    pub(super) repeats: bool,
-}
-
 /// The player's settings, and files with the descriptions.
 pub(super) fn made(
-    course: &WantedCourse<'_>,
+    arguments: &Arguments,
     recorded: &RecordedFiles,
     played: &PlayedModules,
     folder: &Path,
-) -> Result<Table, Failure> {
+) -> Result<PlayerSettings, Failure> {
     let mut described = Vec::new();
     for (name, description) in &played.described {
         let file = format!("{name}.description");
         std::fs::write(folder.join(&file), description.to_bytes())?;
-        described.push(Value::Array(vec![name.as_str().into(), file.into()]));
+        described.push((name.clone(), file));
     }
-    let files = recorded.infos.iter().map(|info| Ok(RecordingPath::from(info.path.canonicalize()?).into()));
-    let files = files.collect::<std::io::Result<Vec<Value>>>()?;
-    let topics = played.topics.iter().map(|topic| topic.as_str().into()).collect();
-    let pair = |(topic, stream): (&String, &String)| Value::Array(vec![topic.as_str().into(), stream.as_str().into()]);
-    let into = played.into.iter().map(pair).collect();
+    let files = recorded.infos.iter().map(|info| Ok(RecordingPath::from(info.path.canonicalize()?)));
+    let files = files.collect::<std::io::Result<_>>()?;
     let mut whole = recorded.infos[0].clone();
     (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
-    let part = course.part.of(&whole, &[]);
+    let part = arguments.part.of(&whole, &[]);
     if let (Some(from_ns), Some(until_ns)) = (part.from_ns, part.until_ns)
         && from_ns >= until_ns
     {
@@ -113,29 +93,27 @@ pub(super) fn made(
         let seconds = recorded.end_ns.saturating_sub(recorded.begin_ns) as f64 / 1e9;
         return Err(format!("nothing lies between --from and --until; the recording lasts {seconds:.1} s").into());
     }
-    if course.repeats {
+    if arguments.repeats {
         note_short_rounds(recorded, played, &part);
     }
-    let ns = |ns: u64| i64::try_from(ns).map(Value::Integer).map_err(|_| format!("{ns} ns is beyond the year 2262"));
-    let mut settings = Table::new();
-    for (key, value) in [
-        ("files", Value::Array(files)),
-        ("begin-ns", ns(recorded.begin_ns)?),
-        ("end-ns", ns(recorded.end_ns)?),
-        ("described", Value::Array(described)),
-        ("topics", Value::Array(topics)),
-        ("into", Value::Array(into)),
-        ("rate", course.rate.into()),
-        ("repeats", course.repeats.into()),
-    ] {
-        settings.insert(key.into(), value);
+    // Integers of a configuration are signed.
+    let mut times = [recorded.begin_ns, recorded.end_ns].into_iter().chain(part.from_ns).chain(part.until_ns);
+    if let Some(ns) = times.find(|ns| i64::try_from(*ns).is_err()) {
+        return Err(format!("{ns} ns is beyond the year 2262").into());
     }
-    for (key, time) in [("from-ns", part.from_ns), ("until-ns", part.until_ns)] {
-        if let Some(time) = time {
-            settings.insert(key.into(), ns(time)?);
-        }
-    }
-    Ok(settings)
+    Ok(PlayerSettings {
+        files,
+        begin_ns: recorded.begin_ns,
+        end_ns: recorded.end_ns,
+        described,
+        topics: played.topics.clone(),
+        into: played.into.clone().into_iter().collect(),
+        answers: None,
+        rate: arguments.rate,
+        from_ns: part.from_ns,
+        until_ns: part.until_ns,
+        repeats: arguments.repeats,
+    })
 }
 
 /// Says how long a round takes if that is longer than what is repeated.
@@ -155,15 +133,14 @@ fn note_short_rounds(recorded: &RecordedFiles, played: &PlayedModules, part: &Se
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeMap;
 
     #[test]
     fn a_recording_may_have_any_name() {
         for name in [&b"main-0001.mcap"[..], b"T\xfcr.mcap", b"\xff", "T\u{fc}r.mcap".as_bytes()] {
             let path = PathBuf::from(OsString::from_vec(name.to_vec()));
-            let written =
-                toml::to_string(&Table::from_iter([("file".to_owned(), RecordingPath::from(path.clone()).into())]));
-            let mut read: std::collections::BTreeMap<String, RecordingPath> =
-                toml::from_str(&written.unwrap()).unwrap();
+            let written = toml::to_string(&BTreeMap::from([("file", RecordingPath::from(path.clone()))]));
+            let mut read: BTreeMap<String, RecordingPath> = toml::from_str(&written.unwrap()).unwrap();
             assert_eq!(PathBuf::from(read.remove("file").unwrap()), path);
         }
     }
