@@ -248,7 +248,8 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         let runs = |name: &str| arguments.run.iter().any(|run| run == name);
         std::fs::write(&saved, saved_of(&text, runs)?)?;
     }
-    let mut settings = settings::made(arguments, recorded, &played, folder)?;
+    let course = (&arguments.part, arguments.rate, arguments.repeats);
+    let mut settings = settings::made(course, recorded, &played, folder)?;
     match noted_answers(recorded, &source, &played, folder) {
         Ok(None) => {}
         Ok(Some(answers)) => {

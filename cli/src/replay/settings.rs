@@ -1,8 +1,8 @@
 //! The settings of the player: `rohrpost replay` writes them into the configuration of its node.
 
-use super::Arguments;
 use super::configuration::PlayedModules;
 use super::recorded::RecordedFiles;
+use crate::record::PartArguments;
 use crate::terminal::{Failure, say};
 use rohrpost_recording::Selection;
 use serde::{Deserialize, Serialize};
@@ -64,9 +64,10 @@ impl From<RecordingPath> for PathBuf {
     }
 }
 
-/// The player's settings, and files with the descriptions.
+/// The player's settings, and files with the descriptions. Of the command line: which part, at which rate, and whether
+/// over and over.
 pub(super) fn made(
-    arguments: &Arguments,
+    (part, rate, repeats): (&PartArguments, f64, bool),
     recorded: &RecordedFiles,
     played: &PlayedModules,
     folder: &Path,
@@ -81,7 +82,7 @@ pub(super) fn made(
     let files = files.collect::<std::io::Result<_>>()?;
     let mut whole = recorded.infos[0].clone();
     (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
-    let part = arguments.part.of(&whole, &[]);
+    let part = part.of(&whole, &[]);
     if let (Some(from_ns), Some(until_ns)) = (part.from_ns, part.until_ns)
         && from_ns >= until_ns
     {
@@ -93,7 +94,7 @@ pub(super) fn made(
         let seconds = recorded.end_ns.saturating_sub(recorded.begin_ns) as f64 / 1e9;
         return Err(format!("nothing lies between --from and --until; the recording lasts {seconds:.1} s").into());
     }
-    if arguments.repeats {
+    if repeats {
         note_short_rounds(recorded, played, &part);
     }
     // Integers of a configuration are signed.
@@ -109,10 +110,10 @@ pub(super) fn made(
         topics: played.topics.clone(),
         into: played.into.clone().into_iter().collect(),
         answers: None,
-        rate: arguments.rate,
+        rate,
         from_ns: part.from_ns,
         until_ns: part.until_ns,
-        repeats: arguments.repeats,
+        repeats,
     })
 }
 
