@@ -7,7 +7,7 @@ use rohrpost::output::plain;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::Name;
 use rohrpost_modules::journal::{ExactRun, JOURNAL_NAME, JOURNAL_NUMBER, Piece};
-use rohrpost_recording::{Info, Reader, RecordedChannel, info};
+use rohrpost_recording::{Info, ReadError, Reader, RecordedChannel, info};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Write;
@@ -57,27 +57,15 @@ pub(super) fn read(
     let untold = || Rc::new(BTreeSet::from([String::new()]));
     let known = info(file).map_or_else(|_| untold(), |info| configurations(&[info]));
     let mut pieced = PiecedRuns::new(folder, quota, known);
-    let mut reader = Reader::open(file)?;
-    let mut damage = None;
-    loop {
-        match reader.next() {
-            Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
-                pieced.take(&channel, message.data)?;
-            }
-            Ok(Some(_)) => {}
-            Ok(None) => break,
-            Err(error) => {
-                // What comes behind it may be whole; but no journal is.
-                let why = format!("the recording is damaged or cut off here: {error}");
-                for run in &mut pieced.runs {
-                    run.ends.get_or_insert_with(|| why.clone());
-                }
-                damage = Some(error);
-                break;
-            }
+    let damage = pieced.take_all(file, modules, |_, _| {})?;
+    let mut runs = pieced.runs;
+    if let Some(error) = &damage {
+        // What comes behind it may be whole; but no journal is.
+        let why = format!("the recording is damaged or cut off here: {error}");
+        for run in &mut runs {
+            run.ends.get_or_insert_with(|| why.clone());
         }
     }
-    let runs = pieced.runs;
     let missing = modules.iter().find(|module| !runs.iter().any(|run| run.module == **module));
     match (missing, damage) {
         (Some(_), Some(error)) => Err(error.into()),
@@ -94,20 +82,9 @@ pub(super) fn of_files(files: &[Info], modules: &[String], folder: &Path) -> Res
     let mut quota = UnpackedQuota::of_files(&paths);
     let mut pieced = PiecedRuns::new(folder, &mut quota, configurations(files));
     let mut progress = ProgressLine::new();
-    for file in files {
-        let mut reader = Reader::open(&file.path)?;
-        loop {
-            match reader.next() {
-                Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
-                    pieced.take(&channel, message.data)?;
-                }
-                Ok(Some(_)) => {}
-                // Behind a damage a piece is missing.
-                Ok(None) | Err(_) => break,
-            }
-            let (read, all) = reader.progress();
-            progress.tell(read, all);
-        }
+    for path in paths {
+        // Behind a damage a piece is missing.
+        pieced.take_all(path, modules, |read, all| progress.tell(read, all))?;
     }
     Ok(pieced.runs)
 }
@@ -126,6 +103,26 @@ fn is_wanted(channel: &RecordedChannel, modules: &[String]) -> bool {
 impl<'a> PiecedRuns<'a> {
     fn new(folder: &'a Path, quota: &'a mut UnpackedQuota, configurations: Rc<BTreeSet<String>>) -> Self {
         Self { runs: Vec::new(), folder, quota, configurations, open: None }
+    }
+
+    /// Takes what a file has of these modules, up to what is wrong with it.
+    fn take_all(
+        &mut self,
+        file: &Path,
+        modules: &[String],
+        mut progress: impl FnMut(u64, u64),
+    ) -> Result<Option<ReadError>, Failure> {
+        let mut reader = Reader::open(file)?;
+        loop {
+            match reader.next() {
+                Ok(Some((channel, message))) if is_wanted(&channel, modules) => self.take(&channel, message.data)?,
+                Ok(Some(_)) => {}
+                Ok(None) => return Ok(None),
+                Err(error) => return Ok(Some(error)),
+            }
+            let (read, all) = reader.progress();
+            progress(read, all);
+        }
     }
 
     fn take(&mut self, channel: &RecordedChannel, value: &[u8]) -> Result<(), Failure> {
@@ -264,10 +261,8 @@ mod tests {
             topic: format!("{module}/{JOURNAL_NAME}").into(),
             name: module.into(),
             item: JOURNAL_NAME.into(),
-            ty: None,
-            message_encoding: Default::default(),
-            schema_encoding: Default::default(),
             texts: texts.into_iter().collect(),
+            ..RecordedChannel::default()
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::info::more_damages;
 use super::part::PartArguments;
-use super::progress::ProgressLine;
+use super::progress::with_progress;
 use crate::terminal::units::size;
 use crate::terminal::{Failure, say};
 use rohrpost_recording::Recovered;
@@ -55,10 +55,7 @@ pub(super) struct MergeArguments {
 pub(super) fn recover(arguments: &RecoverArguments) -> Result<ExitCode, Failure> {
     let file = &arguments.file;
     let to = arguments.output.clone().unwrap_or_else(|| rohrpost_recording::recovered_path(file));
-    let mut line = ProgressLine::new();
-    let told = rohrpost_recording::recover(file, &to, &mut |read, all| line.tell(read, all));
-    drop(line);
-    let told = told?;
+    let told = with_progress(|progress| rohrpost_recording::recover(file, &to, progress))?;
     if arguments.json {
         let damages: Vec<_> =
             told.damages.iter().map(|(at, what)| json!({"at": at, "what": what.to_string()})).collect();
@@ -95,19 +92,15 @@ fn recovered_text(file: &Path, told: &Recovered) -> String {
 pub(super) fn cut(arguments: &CutArguments) -> Result<ExitCode, Failure> {
     let CutArguments { file, output: to, names, part, json } = arguments;
     let selection = part.of(&rohrpost_recording::info(file)?, names);
-    let mut line = ProgressLine::new();
-    let told = rohrpost_recording::cut(file, to, &selection, &mut |read, all| line.tell(read, all));
-    drop(line);
-    report(to, told?, *json);
+    let told = with_progress(|progress| rohrpost_recording::cut(file, to, &selection, progress))?;
+    report(to, told, *json);
     Ok(ExitCode::SUCCESS)
 }
 
 pub(super) fn merge(arguments: &MergeArguments) -> Result<ExitCode, Failure> {
     let MergeArguments { files, output: to, json } = arguments;
-    let mut line = ProgressLine::new();
-    let told = rohrpost_recording::merge(files, to, &mut |read, all| line.tell(read, all));
-    drop(line);
-    report(to, told?, *json);
+    let told = with_progress(|progress| rohrpost_recording::merge(files, to, progress))?;
+    report(to, told, *json);
     Ok(ExitCode::SUCCESS)
 }
 

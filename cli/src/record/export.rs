@@ -2,7 +2,7 @@
 
 use super::jsonl::{JsonLines, JsonMessage};
 use super::part::PartArguments;
-use super::progress::ProgressLine;
+use super::progress::{ProgressLine, with_progress};
 use crate::terminal::units::size;
 use crate::terminal::{Failure, complain, say};
 use rohrpost::output::plain::{self, ForeignText};
@@ -83,10 +83,8 @@ fn classes(info: &Info) -> BTreeMap<u8, String> {
 }
 
 fn draw(file: &Path, to: &Path, selection: &Selection, options: &DrawOptions) -> Result<ExitCode, Failure> {
-    let mut line = ProgressLine::new();
-    let told = rohrpost_recording::draw(file, to, selection, options, &mut |read, all| line.tell(read, all));
-    drop(line);
-    say(drawn_text(to, &told?));
+    let told = with_progress(|progress| rohrpost_recording::draw(file, to, selection, options, progress))?;
+    say(drawn_text(to, &told));
     Ok(ExitCode::SUCCESS)
 }
 

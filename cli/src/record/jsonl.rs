@@ -136,7 +136,6 @@ fn content<'a>(channel: &'a RecordedChannel, data: &[u8]) -> JsonContent<'a> {
 mod tests {
     use super::*;
     use rohrpost::schema::{Field, Members, Named, Type};
-    use std::collections::BTreeMap;
     use std::sync::Arc;
 
     fn channel(ty: Option<Type>, encoding: &str) -> RecordedChannel {
@@ -146,8 +145,7 @@ mod tests {
             item: "scan".into(),
             ty: ty.map(Arc::new),
             message_encoding: encoding.into(),
-            schema_encoding: Default::default(),
-            texts: BTreeMap::new(),
+            ..RecordedChannel::default()
         }
     }
 

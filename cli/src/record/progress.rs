@@ -1,6 +1,7 @@
 //! How far a command is, on a terminal.
 
 use crate::terminal::complain_in_place;
+use rohrpost_recording::Progress;
 use std::io::{self, IsTerminal};
 use std::time::{Duration, Instant};
 
@@ -28,6 +29,12 @@ impl ProgressLine {
         self.has_shown = true;
         complain_in_place(format_args!("{} %", read.saturating_mul(100).checked_div(all).unwrap_or(100)));
     }
+}
+
+/// Does what tells how far it is; its end takes the line away.
+pub(super) fn with_progress<T>(act: impl FnOnce(&mut Progress<'_>) -> T) -> T {
+    let mut line = ProgressLine::new();
+    act(&mut |read, all| line.tell(read, all))
 }
 
 impl Drop for ProgressLine {

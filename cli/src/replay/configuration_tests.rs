@@ -47,6 +47,17 @@ fn demo_modules() -> Vec<(&'static str, Description)> {
     ]
 }
 
+/// That these modules run, of the user's own configuration, and that all the others are played.
+fn wish<'a>(
+    installation: &'a Installation,
+    folder: &'a Path,
+    recorded: &'a RecordedFiles,
+    runs: &'a [String],
+) -> ReplayWish<'a> {
+    let drawing = ReplayDrawing::Nothing;
+    ReplayWish { installation, folder, recorded, runs, is_own: true, names: &[], drawing, saved: None }
+}
+
 /// The configuration, and what is played.
 fn made(text: &str, modules: &[(&str, Description)], runs: &[&str], names: &[&str]) -> (Installation, PlayedModules) {
     let folder = tempfile::tempdir().unwrap();
@@ -54,16 +65,7 @@ fn made(text: &str, modules: &[(&str, Description)], runs: &[&str], names: &[&st
     let source = Installation::parse(text, Path::new("robot.toml")).unwrap();
     let texts = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     let (runs, names) = (texts(runs), texts(names));
-    let wish = ReplayWish {
-        installation: &source,
-        folder: folder.path(),
-        recorded: &recorded,
-        runs: &runs,
-        is_own: true,
-        names: &names,
-        drawing: ReplayDrawing::Nothing,
-        saved: None,
-    };
+    let wish = ReplayWish { names: &names, ..wish(&source, folder.path(), &recorded, &runs) };
     let played = wish.played().unwrap();
     let (text, player) = wish.text(&played, Table::new()).unwrap();
     let installation = Installation::parse(&text, Path::new("replay.toml"));
@@ -146,16 +148,7 @@ fn what_cannot_be_played_is_refused_in_words() {
     ] {
         let texts = |names: Vec<&str>| names.into_iter().map(str::to_owned).collect::<Vec<_>>();
         let (runs, names) = (texts(runs), texts(names));
-        let wish = ReplayWish {
-            installation: &source,
-            folder: folder.path(),
-            recorded: &recorded,
-            runs: &runs,
-            is_own: true,
-            names: &names,
-            drawing: ReplayDrawing::Nothing,
-            saved: None,
-        };
+        let wish = ReplayWish { names: &names, ..wish(&source, folder.path(), &recorded, &runs) };
         let told = wish.played().map(|_| ()).unwrap_err().to_string();
         assert!(told.contains(words), "{told}");
     }
@@ -173,16 +166,7 @@ fn paths_in_settings_begin_where_they_did() {
     let text = text.replace("builtin = \"mapper\"", "program = [\"./bin/mapper\", \"./x\"]");
     let source = Installation::parse(&text, Path::new("robot.toml")).unwrap();
     let runs = ["mapper.0".to_owned()];
-    let wish = ReplayWish {
-        installation: &source,
-        folder: folder.path(),
-        recorded: &recorded,
-        runs: &runs,
-        is_own: true,
-        names: &[],
-        drawing: ReplayDrawing::Nothing,
-        saved: None,
-    };
+    let wish = wish(&source, folder.path(), &recorded, &runs);
     let (text, _) = wish.text(&wish.played().unwrap(), Table::new()).unwrap();
     let installation = Installation::parse(&text, Path::new("replay.toml")).unwrap();
     let mapper = &installation.modules[1];
@@ -204,16 +188,7 @@ fn stranger(text: &str, runs: &[&str], is_own: bool, drawing: ReplayDrawing) -> 
     let recorded = recorded(folder.path(), &demo_modules());
     let source = Installation::parse(text, Path::new("robot.toml")).unwrap();
     let runs: Vec<String> = runs.iter().map(|name| (*name).to_owned()).collect();
-    let wish = ReplayWish {
-        installation: &source,
-        folder: Path::new("/work"),
-        recorded: &recorded,
-        runs: &runs,
-        is_own,
-        names: &[],
-        drawing,
-        saved: None,
-    };
+    let wish = ReplayWish { is_own, drawing, ..wish(&source, Path::new("/work"), &recorded, &runs) };
     let played = wish.played().map_err(|error| error.to_string())?;
     let (text, _) = wish.text(&played, Table::new()).map_err(|error| error.to_string())?;
     Ok(Installation::parse(&text, Path::new("replay.toml")).unwrap())

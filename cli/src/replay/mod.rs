@@ -36,7 +36,6 @@ use rohrpost_config::{Installation, StreamSpec};
 use rohrpost_launch::{Launch, events};
 use rohrpost_recorder::player::RATE_MAX;
 use session::ReplaySession;
-use settings::WantedCourse;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -244,17 +243,17 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         let runs = |name: &str| arguments.run.iter().any(|run| run == name);
         std::fs::write(&saved, saved_of(&text, runs)?)?;
     }
-    let course = WantedCourse { part: &arguments.part, rate: arguments.rate, repeats: arguments.repeats };
-    let mut settings = settings::made(&course, recorded, &played, folder)?;
+    let course = (&arguments.part, arguments.rate, arguments.repeats);
+    let mut settings = settings::made(course, recorded, &played, folder)?;
     match noted_answers(recorded, &source, &played, folder) {
         Ok(None) => {}
         Ok(Some(answers)) => {
             std::fs::write(folder.join(ANSWERS), answers)?;
-            settings.insert("answers".into(), ANSWERS.into());
+            settings.answers = Some(ANSWERS.into());
         }
         Err(error) => complain(format_args!("commands are not answered, as the journals cannot be read: {error}")),
     }
-    let (text, player) = wish.text(&played, settings)?;
+    let (text, player) = wish.text(&played, toml::Table::try_from(settings)?)?;
     let path = folder.join(CONFIG);
     std::fs::write(&path, text)?;
     let named =

@@ -12,7 +12,7 @@ use crate::record::ProgressLine;
 use crate::terminal::Failure;
 use rohrpost::output::plain::{ForeignText, line};
 use rohrpost::schema::{DataItem, DataKind, Description, Field, Type};
-use rohrpost_config::Installation;
+use rohrpost_config::{Installation, is_class_name};
 use rohrpost_recording::{ChannelInfo, ReadError, Reader};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -45,11 +45,9 @@ impl FromStr for IntoStream {
         let (module, item) = stream.split_once('/').ok_or_else(wrong)?;
         let is_item = item.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
             && item.chars().all(|letter| letter.is_ascii_alphanumeric() || letter == '_');
-        let is_module = module.split_once('.').is_some_and(|(class, instance)| {
-            let is_class = class.starts_with(|first: char| first.is_ascii_lowercase())
-                && class.chars().all(|letter| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '-');
-            is_class && instance.parse::<u8>().is_ok()
-        });
+        let is_module = module
+            .split_once('.')
+            .is_some_and(|(class, instance)| is_class_name(class) && instance.parse::<u8>().is_ok());
         if topic.is_empty() || !is_module || !is_item {
             return Err(wrong());
         }

@@ -6,10 +6,18 @@ use crate::record::PartArguments;
 use crate::terminal::{Failure, say};
 use rohrpost_recorder::player::{ROUND_MIN, RecordingPath};
 use rohrpost_recording::Selection;
+<<<<<<< HEAD
 use std::path::Path;
+=======
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::os::unix::ffi::OsStringExt;
+use std::path::{Path, PathBuf};
+>>>>>>> small6
 use std::time::Duration;
-use toml::{Table, Value};
 
+<<<<<<< HEAD
 /// What the command line says of the course.
 pub(super) struct WantedCourse<'a> {
     pub(super) part: &'a PartArguments,
@@ -18,26 +26,79 @@ pub(super) struct WantedCourse<'a> {
 }
 
 /// The player's settings, and files with the descriptions.
+=======
+/// A round takes so long at least, also if what is repeated is shorter: rounds of no length would take a processor.
+pub(super) const ROUND_MIN: Duration = Duration::from_millis(100);
+
+/// What `rohrpost replay` writes into the configuration of its node.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct PlayerSettings {
+    /// The recording, in order.
+    pub(super) files: Vec<RecordingPath>,
+    /// When the recording begins and ends, ns since 1970.
+    pub(super) begin_ns: u64,
+    pub(super) end_ns: u64,
+    /// Names that it stands in for, and files with their descriptions.
+    pub(super) described: Vec<(String, String)>,
+    /// What it plays.
+    pub(super) topics: BTreeSet<String>,
+    /// Topics of another program, and those in which their messages are played as bytes.
+    pub(super) into: Vec<(String, String)>,
+    /// The file with the answers of modules.
+    pub(super) answers: Option<String>,
+    /// Times the recorded speed.
+    pub(super) rate: f64,
+    pub(super) from_ns: Option<u64>,
+    pub(super) until_ns: Option<u64>,
+    #[serde(default)]
+    pub(super) repeats: bool,
+}
+
+/// Where a recording is. Names of files are bytes, and configurations are texts: of a name that is no text they have
+/// the numbers of its bytes.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(untagged)]
+pub(super) enum RecordingPath {
+    Text(String),
+    Bytes(Vec<u8>),
+}
+
+impl From<PathBuf> for RecordingPath {
+    fn from(path: PathBuf) -> Self {
+        path.into_os_string().into_string().map_or_else(|name| Self::Bytes(name.into_vec()), Self::Text)
+    }
+}
+
+impl From<RecordingPath> for PathBuf {
+    fn from(path: RecordingPath) -> Self {
+        match path {
+            RecordingPath::Text(text) => text.into(),
+            RecordingPath::Bytes(bytes) => OsString::from_vec(bytes).into(),
+        }
+    }
+}
+
+/// The player's settings, and files with the descriptions. Of the command line: which part, at which rate, and whether
+/// over and over.
+>>>>>>> small6
 pub(super) fn made(
-    course: &WantedCourse<'_>,
+    (part, rate, repeats): (&PartArguments, f64, bool),
     recorded: &RecordedFiles,
     played: &PlayedModules,
     folder: &Path,
-) -> Result<Table, Failure> {
+) -> Result<PlayerSettings, Failure> {
     let mut described = Vec::new();
     for (name, description) in &played.described {
         let file = format!("{name}.description");
         std::fs::write(folder.join(&file), description.to_bytes())?;
-        described.push(Value::Array(vec![name.as_str().into(), file.into()]));
+        described.push((name.clone(), file));
     }
-    let files = recorded.infos.iter().map(|info| Ok(RecordingPath::from(info.path.canonicalize()?).into()));
-    let files = files.collect::<std::io::Result<Vec<Value>>>()?;
-    let topics = played.topics.iter().map(|topic| topic.as_str().into()).collect();
-    let pair = |(topic, stream): (&String, &String)| Value::Array(vec![topic.as_str().into(), stream.as_str().into()]);
-    let into = played.into.iter().map(pair).collect();
+    let files = recorded.infos.iter().map(|info| Ok(RecordingPath::from(info.path.canonicalize()?)));
+    let files = files.collect::<std::io::Result<_>>()?;
     let mut whole = recorded.infos[0].clone();
     (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
-    let part = course.part.of(&whole, &[]);
+    let part = part.of(&whole, &[]);
     if let (Some(from_ns), Some(until_ns)) = (part.from_ns, part.until_ns)
         && from_ns >= until_ns
     {
@@ -49,29 +110,27 @@ pub(super) fn made(
         let seconds = recorded.end_ns.saturating_sub(recorded.begin_ns) as f64 / 1e9;
         return Err(format!("nothing lies between --from and --until; the recording lasts {seconds:.1} s").into());
     }
-    if course.repeats {
+    if repeats {
         note_short_rounds(recorded, played, &part);
     }
-    let ns = |ns: u64| i64::try_from(ns).map(Value::Integer).map_err(|_| format!("{ns} ns is beyond the year 2262"));
-    let mut settings = Table::new();
-    for (key, value) in [
-        ("files", Value::Array(files)),
-        ("begin-ns", ns(recorded.begin_ns)?),
-        ("end-ns", ns(recorded.end_ns)?),
-        ("described", Value::Array(described)),
-        ("topics", Value::Array(topics)),
-        ("into", Value::Array(into)),
-        ("rate", course.rate.into()),
-        ("repeats", course.repeats.into()),
-    ] {
-        settings.insert(key.into(), value);
+    // Integers of a configuration are signed.
+    let mut times = [recorded.begin_ns, recorded.end_ns].into_iter().chain(part.from_ns).chain(part.until_ns);
+    if let Some(ns) = times.find(|ns| i64::try_from(*ns).is_err()) {
+        return Err(format!("{ns} ns is beyond the year 2262").into());
     }
-    for (key, time) in [("from-ns", part.from_ns), ("until-ns", part.until_ns)] {
-        if let Some(time) = time {
-            settings.insert(key.into(), ns(time)?);
-        }
-    }
-    Ok(settings)
+    Ok(PlayerSettings {
+        files,
+        begin_ns: recorded.begin_ns,
+        end_ns: recorded.end_ns,
+        described,
+        topics: played.topics.clone(),
+        into: played.into.clone().into_iter().collect(),
+        answers: None,
+        rate,
+        from_ns: part.from_ns,
+        until_ns: part.until_ns,
+        repeats,
+    })
 }
 
 /// Says how long a round takes if that is longer than what is repeated.
@@ -87,3 +146,22 @@ fn note_short_rounds(recorded: &RecordedFiles, played: &PlayedModules, part: &Se
         say(format_args!("--loop: what is repeated lasts {lasts:?}; each round takes {ROUND_MIN:?} at least"));
     }
 }
+<<<<<<< HEAD
+=======
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn a_recording_may_have_any_name() {
+        for name in [&b"main-0001.mcap"[..], b"T\xfcr.mcap", b"\xff", "T\u{fc}r.mcap".as_bytes()] {
+            let path = PathBuf::from(OsString::from_vec(name.to_vec()));
+            let written = toml::to_string(&BTreeMap::from([("file", RecordingPath::from(path.clone()))]));
+            let mut read: BTreeMap<String, RecordingPath> = toml::from_str(&written.unwrap()).unwrap();
+            assert_eq!(PathBuf::from(read.remove("file").unwrap()), path);
+        }
+    }
+}
+>>>>>>> small6

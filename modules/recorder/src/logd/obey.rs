@@ -4,7 +4,7 @@ use super::control::{OpenOrder, Told};
 use super::folder::below;
 use super::{Logd, has_begun};
 use rohrpost_recording::{ControlAnswer, ControlCommand, FileChange, Mark, OrderError, PendingOrder, Status, Writer};
-use std::path::Path;
+use std::path::PathBuf;
 
 /// Both as users write it: seconds since 1970.
 const NS_PER_S: u64 = 1_000_000_000;
@@ -48,7 +48,7 @@ impl Logd {
             }),
             OpenOrder::Moved(pending, folder) => changed(pending, |answer| {
                 options.folder.clone_from(folder);
-                with_path(answer, "directory", folder)
+                with_path(answer, "directory", Some(folder))
             }),
         });
     }
@@ -77,7 +77,7 @@ impl Logd {
     fn go_to(&mut self, path: &str) -> Result<OpenOrder, ControlAnswer> {
         let folder = below(&self.root, path, self.folder_mode).map_err(|error| ControlAnswer::err(&error))?;
         let Some(writer) = &mut self.writer else {
-            let answer = with_path(ControlAnswer::ok(), "directory", &folder);
+            let answer = with_path(ControlAnswer::ok(), "directory", Some(&folder));
             self.options.folder = folder;
             return Err(answer);
         };
@@ -106,13 +106,9 @@ impl Logd {
 
     fn how_it_goes(&self) -> ControlAnswer {
         let answer = ControlAnswer::ok().with("recording", if self.writer.is_some() { "on" } else { "off" });
-        let answer = with_path(answer, "directory", &self.options.folder);
+        let answer = with_path(answer, "directory", Some(&self.options.folder));
         let Some(status) = self.writer.as_ref().map(Writer::status) else { return answer };
-        let answer = match &status.file {
-            Some(file) => with_path(answer, "file", file),
-            None => answer,
-        };
-        let answer = answer
+        let answer = with_path(answer, "file", status.file.as_ref())
             .with("channels", status.channels.len())
             .with("written", status.written)
             .with("synced", status.synced)
@@ -141,7 +137,7 @@ fn open(
 fn begun(status: Option<&Status>) -> Option<ControlAnswer> {
     let Some(status) = status else { return Some(ControlAnswer::err(&"it was switched off again")) };
     match (&status.file, &status.problem) {
-        (Some(file), _) => Some(with_path(ControlAnswer::ok(), "file", file)),
+        (Some(file), _) => Some(with_path(ControlAnswer::ok(), "file", Some(file))),
         (None, Some(problem)) => Some(ControlAnswer::err(&format!("it is on, but writes nothing: {}", problem.error))),
         (None, None) => None,
     }
@@ -151,17 +147,14 @@ fn begun(status: Option<&Status>) -> Option<ControlAnswer> {
 fn changed(pending: &PendingOrder, more: impl FnOnce(ControlAnswer) -> ControlAnswer) -> Option<ControlAnswer> {
     Some(match pending.poll()? {
         Ok(FileChange { closed, file }) => {
-            let answer = ControlAnswer::ok();
-            let answer = match &closed {
-                Some(closed) => with_path(answer, "closed", closed),
-                None => answer,
-            };
-            more(with_path(answer, "file", &file))
+            let answer = with_path(ControlAnswer::ok(), "closed", closed.as_ref());
+            more(with_path(answer, "file", Some(&file)))
         }
         Err(error) => ControlAnswer::err(&error),
     })
 }
 
-fn with_path(answer: ControlAnswer, key: &str, path: &Path) -> ControlAnswer {
-    answer.with_text(key, &path.to_string_lossy())
+/// Tells a path, if there is one.
+fn with_path(answer: ControlAnswer, key: &str, path: Option<&PathBuf>) -> ControlAnswer {
+    path.into_iter().fold(answer, |answer, path| answer.with_text(key, &path.to_string_lossy()))
 }

@@ -149,9 +149,7 @@ impl Taps {
             tracing::error!("{}/{}: {}", tap.module, tap.item.field.name, tap.refusal);
         }
     }
-}
 
-impl Taps {
     /// Notes a value that comes while nothing is recorded: it is no loss. The next recording may begin with it.
     pub(super) fn pass_over(&mut self, earlier: Option<&mut Earlier>, now: &SystemTime, data: &Received<'_>) {
         let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };

@@ -1,6 +1,7 @@
 //! What is played: values as their modules published them, and what became of them.
 
 use rohrpost::interface::StandIn;
+use rohrpost::wire::append;
 use rohrpost::{Context, ContextError, Installation, Name};
 use rohrpost_mailbox::Stamp;
 use rohrpost_recording::{Message, RecordedChannel};
@@ -123,15 +124,11 @@ fn stamp_of(message: &Message<'_>, is_opaque: bool) -> u64 {
     }
 }
 
-/// Postcard of bytes: their count, seven bits a byte, and they themselves.
+/// Postcard of bytes: their count, and they themselves.
 fn opaque_of(to: &mut Vec<u8>, bytes: &[u8]) {
     to.clear();
-    let mut count = bytes.len();
-    while count >= 0x80 {
-        to.push(count as u8 | 0x80);
-        count >>= 7;
-    }
-    to.push(count as u8);
+    // A number is always written.
+    let _ = append(to, &bytes.len());
     to.extend_from_slice(bytes);
 }
 
