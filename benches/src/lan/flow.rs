@@ -89,8 +89,8 @@ struct FlowTurn {
 // SAFETY: atomics only.
 unsafe impl Zeroable for FlowTurn {}
 
-/// Sends from one process to another; `inlet` never waits for its receiver. Each opens its own side; the receiver first. Messages must be whole and in order,
-/// without duplicates.
+/// Sends from one process to another; `inlet` never waits for its receiver. Each opens its own side; the receiver
+/// first. Messages must be whole and in order, without duplicates.
 ///
 /// # Errors
 /// What the receiver failed with, else the sender; also when nothing arrived.
