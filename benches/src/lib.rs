@@ -4,7 +4,7 @@
 //! Harness, rounds, statistics and table are those of `rohrpost_bench_local`. Here are the cases, and how contenders
 //! send: ours in `streams`, `one_way`, `lan`, `tdma` and `tcp`, then `floors`, `peers`, and programs in `foreign`.
 //!
-//! A case is added in `cases`: anything that has a name and gives rows.
+//! A case is added in `cases`: a name, and what measures its rows.
 
 pub mod cases;
 pub mod counting;

@@ -3,6 +3,7 @@
 use clap::{Parser, Subcommand};
 use rohrpost_bench::cases;
 use rohrpost_bench::counting::CountingHeap;
+use rohrpost_bench::languages::{Interpreter, c_version};
 use rohrpost_bench_local::{Case, Failure, Settings, report};
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -63,31 +64,8 @@ struct Run {
 }
 
 fn main() -> ExitCode {
-    if let Some(done) = cases::run_hidden_program() {
-        return done.map_or_else(
-            |error| {
-                let _ = writeln!(io::stderr(), "{error}");
-                ExitCode::FAILURE
-            },
-            |()| ExitCode::SUCCESS,
-        );
-    }
-    let done = match Arguments::parse().command {
-        Command::Local(run) => measure(&run, &cases::all()),
-        Command::Streams(run) => measure(&run, &cases::streams::all()),
-        Command::Recording(run) => measure(&run, &cases::recording::all()),
-        Command::Lan(run) => {
-            rohrpost_bench::lan::prepare();
-            measure(&run, &cases::lan::all())
-        }
-        Command::Tdma(run) => {
-            rohrpost_bench::lan::prepare();
-            measure(&run, &cases::tdma::all())
-        }
-        Command::Tcp(run) => measure(&run, &cases::tcp::all()),
-        Command::Languages { run, python } => measure_languages(&run, python),
-    };
-    match done {
+    let done = cases::run_hidden_program().map(|done| done.map(|()| true));
+    match done.unwrap_or_else(|| measure(Arguments::parse().command)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
@@ -98,24 +76,34 @@ fn main() -> ExitCode {
 }
 
 /// False when a contender failed.
-fn measure(arguments: &Run, cases: &[Case]) -> Result<bool, Failure> {
-    run(arguments, &settings(arguments), cases)
+fn measure(command: Command) -> Result<bool, Failure> {
+    if matches!(command, Command::Lan(_) | Command::Tdma(_)) {
+        rohrpost_bench::lan::prepare();
+    }
+    match command {
+        Command::Local(run) => run.measure(&run.settings(), &cases::all()),
+        Command::Streams(run) => run.measure(&run.settings(), &cases::streams::all()),
+        Command::Recording(run) => run.measure(&run.settings(), &cases::recording::all()),
+        Command::Lan(run) => run.measure(&run.settings(), &cases::lan::all()),
+        Command::Tdma(run) => run.measure(&run.settings(), &cases::tdma::all()),
+        Command::Tcp(run) => run.measure(&run.settings(), &cases::tcp::all()),
+        Command::Languages { run, python } => {
+            let mut settings = Settings { python, ..run.settings() };
+            settings.versions = c_version().into_iter().chain(Interpreter::of(&settings).versions()).collect();
+            run.measure(&settings, &cases::languages::all())
+        }
+    }
 }
 
-fn measure_languages(arguments: &Run, python: Option<PathBuf>) -> Result<bool, Failure> {
-    use rohrpost_bench::languages::{Interpreter, c_version};
-    let mut settings = Settings { python, ..settings(arguments) };
-    settings.versions = c_version().into_iter().chain(Interpreter::of(&settings).versions()).collect();
-    run(arguments, &settings, &cases::languages::all())
-}
+impl Run {
+    fn settings(&self) -> Settings {
+        let rounds = if self.quick { self.rounds.min(1) } else { self.rounds };
+        let (only, rohrpost) = (self.only.clone(), self.rohrpost.clone());
+        Settings { rounds, only, quick: self.quick, rohrpost, ..Settings::default() }
+    }
 
-fn settings(arguments: &Run) -> Settings {
-    let rounds = if arguments.quick { arguments.rounds.min(1) } else { arguments.rounds };
-    let (only, rohrpost) = (arguments.only.clone(), arguments.rohrpost.clone());
-    Settings { rounds, only, quick: arguments.quick, rohrpost, ..Settings::default() }
-}
-
-fn run(arguments: &Run, settings: &Settings, cases: &[Case]) -> Result<bool, Failure> {
-    let say = |text: String| writeln!(io::stdout(), "{text}").is_ok();
-    Ok(report::run(settings, cases, arguments.json, say)?.is_sound())
+    fn measure(&self, settings: &Settings, cases: &[Case]) -> Result<bool, Failure> {
+        let say = |text: String| writeln!(io::stdout(), "{text}").is_ok();
+        Ok(report::run(settings, cases, self.json, say)?.is_sound())
+    }
 }

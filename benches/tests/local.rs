@@ -59,7 +59,7 @@ fn a_case_that_is_none_is_refused() {
     assert!(!output.status.success() && said.contains("`no-such-case`") && said.contains("one-core"), "{said}");
 }
 
-/// A run whose turn has begun, and has made something in shared memory.
+/// Begins a run, and waits until a turn has made something in shared memory.
 fn begun() -> (Child, Vec<String>) {
     let (child, pids) = begin("local", "blocking", |_, processes| processes == 2);
     wait_for("something in shared memory", || !left_behind(&prefix(&child)).is_empty());

@@ -46,7 +46,7 @@ fn every_contender_records_all_and_every_line_is_complete() {
     assert_eq!(left_behind(&prefix), [""; 0]);
 }
 
-/// A run whose turn has what it needs: its process, and the folder with the recording.
+/// Begins a run, and waits until a turn has its process, and the folder with the recording.
 fn begun() -> (Child, Vec<String>) {
     let (child, pids) = begin("recording", "recorded", |_, processes| processes == 1);
     wait_for("its folder", || !left_behind(&prefix(&child)).is_empty());

@@ -1,4 +1,4 @@
-//! The cases. To add one: something that has a name and gives rows, and a line in [`all`].
+//! The cases. To add one: a `Case` with a name and what measures its rows, and a line in [`all`].
 
 mod cost;
 mod errors;

@@ -12,11 +12,10 @@ use super::Wire;
 use super::udp::Datagrams;
 use rohrpost_bench_local::hand_over::{HandOver, Lanes, Wake};
 use rohrpost_bench_local::harness::{
-    Cell, Child, End, Failure, Gate, Link, Meetings, Scratch, Shared, settle, time_two_processes,
+    Cell, Child, End, Failure, Gate, Link, Meetings, Scratch, Shared, check_children, settle, time_two_processes,
 };
 use rohrpost_bench_local::ours::Station;
 use rohrpost_mailbox::Name;
-use std::time::Instant;
 
 /// From the near end to the far one, and back.
 const PORTS: [u16; 2] = [20_118, 20_119];
@@ -65,58 +64,28 @@ fn time<R: Link, M: Link>(
     relay: impl Fn(End, Goes) -> Result<R, Failure>,
     module: impl Fn(End, &mut Meetings) -> Result<M, Failure>,
 ) -> Result<Vec<f64>, Failure> {
-    let mut relays = Relays::start(wire, cell, relay)?;
-    let timed = time_two_processes(cell, module);
-    relays.check()?;
-    timed
-}
-
-/// All four, until this is dropped.
-struct Relays(Vec<Child>);
-
-impl Relays {
-    fn start<R: Link>(
-        wire: &Wire,
-        cell: &Cell,
-        local: impl Fn(End, Goes) -> Result<R, Failure>,
-    ) -> Result<Self, Failure> {
-        let gate = Shared::<Gate>::new()?;
-        let mut relays = Self(Vec::new());
-        for (end, goes) in
-            [(End::Ping, Goes::Out), (End::Ping, Goes::In), (End::Pong, Goes::Out), (End::Pong, Goes::In)]
-        {
-            let relay = Child::start(|| {
-                // A port for each direction: an end that only sends must not receive.
-                let there = (goes == Goes::Out) == (end == End::Ping);
-                let port = PORTS[usize::from(!there)];
-                let mut network = Datagrams::between(wire, end, [port, port])?;
-                let mut local = local(end, goes)?;
-                settle(end, cell.placement, cell.scheduling)?;
-                gate.meet(ALL)?;
-                match goes {
-                    Goes::Out => carry(&mut local, &mut network, cell.bytes),
-                    Goes::In => carry(&mut network, &mut local, cell.bytes),
-                }
-            })?;
-            relays.0.push(relay);
-        }
-        // A relay that fails before it reaches the gate gives its reason in `check`.
-        if let Err(late) = gate.meet(ALL) {
-            relays.check()?;
-            return Err(late);
-        }
-        Ok(relays)
-    }
-
-    /// A relay ends only when it fails.
-    fn check(&mut self) -> Result<(), Failure> {
-        for mut relay in std::mem::take(&mut self.0) {
-            if relay.has_ended()? {
-                relay.finish(Instant::now())?;
+    let gate = Shared::<Gate>::new()?;
+    let start = |(end, goes)| {
+        Child::start(|| {
+            // A port for each direction: an end that only sends must not receive.
+            let there = (goes == Goes::Out) == (end == End::Ping);
+            let port = PORTS[usize::from(!there)];
+            let mut network = Datagrams::between(wire, end, [port, port])?;
+            let mut local = relay(end, goes)?;
+            settle(end, cell.placement, cell.scheduling)?;
+            gate.meet(ALL)?;
+            match goes {
+                Goes::Out => carry(&mut local, &mut network, cell.bytes),
+                Goes::In => carry(&mut network, &mut local, cell.bytes),
             }
-        }
-        Ok(())
-    }
+        })
+    };
+    let all = [(End::Ping, Goes::Out), (End::Ping, Goes::In), (End::Pong, Goes::Out), (End::Pong, Goes::In)];
+    let mut relays = all.into_iter().map(start).collect::<Result<Vec<_>, Failure>>()?;
+    gate.meet_children(&mut relays)?;
+    let timed = time_two_processes(cell, module);
+    check_children(&mut relays)?;
+    timed
 }
 
 /// The relays, and the process that starts them.

@@ -1,7 +1,7 @@
 //! Messages in one direction at the full rate, with losses allowed: received and lost messages are counted.
 
 use crate::floors::ring::Bell;
-use crate::one_way::Sink;
+use crate::one_way::{NUMBER_BYTES, Sink, number_at, put_number};
 use rohrpost_bench_local::Failure;
 use rohrpost_bench_local::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, copy_whole, settle};
 use rohrpost_mailbox::{monotonic_ns, sys};
@@ -18,8 +18,6 @@ pub trait Outlet {
 }
 
 /// A message is its number, filler, and its number again.
-const NUMBER_BYTES: usize = 8;
-/// What is between them.
 pub const FILLER: u8 = 0x5a;
 /// Every so many-th message is checked whole, the others at both ends: else checking would take most of the time.
 const LOOK_EVERY: u64 = 61;
@@ -91,8 +89,8 @@ struct FlowTurn {
 // SAFETY: atomics only.
 unsafe impl Zeroable for FlowTurn {}
 
-/// Sends from one process to another; `inlet` never waits for its receiver. Each opens its own side; the receiver first. Messages must be whole and in order,
-/// without duplicates.
+/// Sends from one process to another; `inlet` never waits for its receiver. Each opens its own side; the receiver
+/// first. Messages must be whole and in order, without duplicates.
 ///
 /// # Errors
 /// What the receiver failed with, else the sender; also when nothing arrived.
@@ -200,14 +198,6 @@ impl Window {
     }
 }
 
-/// Puts its number at both ends of a message.
-pub fn put_number(message: &mut [u8], number: u64) {
-    let bytes = number.to_le_bytes();
-    message[..NUMBER_BYTES].copy_from_slice(&bytes);
-    let tail = message.len() - NUMBER_BYTES;
-    message[tail..].copy_from_slice(&bytes);
-}
-
 fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &FlowTurn) -> Result<(), Failure> {
     let mut message = vec![0; flow.bytes];
     let (mut next, mut received) = (0, 0);
@@ -262,12 +252,6 @@ pub(super) fn put_ends(from: &[u8], to: &mut [u8]) {
     let tail = to.len() - NUMBER_BYTES;
     to[..NUMBER_BYTES].copy_from_slice(&from[..NUMBER_BYTES]);
     to[tail..].copy_from_slice(&from[tail..]);
-}
-
-fn number_at(message: &[u8], at: usize) -> u64 {
-    let mut bytes = [0; NUMBER_BYTES];
-    bytes.copy_from_slice(&message[at..at + NUMBER_BYTES]);
-    u64::from_le_bytes(bytes)
 }
 
 /// The number of a message, which must be whole.

@@ -46,7 +46,7 @@ impl<S: Sink, R: Source> Link for Duplex<S, R> {
 /// Most senders of a stream.
 const SENDERS_MAX: usize = 8;
 /// A message is its number, its sender, filler, and its number again.
-const NUMBER_BYTES: usize = 8;
+pub(crate) const NUMBER_BYTES: usize = 8;
 const FILLER: u8 = 0xa5;
 /// Tells the receiver that this sender has sent all.
 const LAST: u64 = u64::MAX;
@@ -153,7 +153,8 @@ fn send_all(sink: &mut impl Sink, stream: &Stream, sender: u8) -> Result<(), Fai
     sink.send(&message)
 }
 
-fn put_number(message: &mut [u8], number: u64) {
+/// Puts its number at both ends of a message.
+pub(crate) fn put_number(message: &mut [u8], number: u64) {
     let bytes = number.to_le_bytes();
     message[..NUMBER_BYTES].copy_from_slice(&bytes);
     let tail = message.len() - NUMBER_BYTES;
@@ -187,17 +188,19 @@ fn receive_all(source: &mut impl Source, stream: &Stream, turn: &StreamTurn) -> 
     Ok(())
 }
 
+/// The number at this place of a message.
+pub(crate) fn number_at(message: &[u8], at: usize) -> u64 {
+    let mut bytes = [0; NUMBER_BYTES];
+    bytes.copy_from_slice(&message[at..at + NUMBER_BYTES]);
+    u64::from_le_bytes(bytes)
+}
+
 /// The sender and the number of a message, which must be whole.
 fn checked(message: &[u8]) -> Result<(usize, u64), Failure> {
-    let number_at = |at: usize| {
-        let mut bytes = [0; NUMBER_BYTES];
-        bytes.copy_from_slice(&message[at..at + NUMBER_BYTES]);
-        u64::from_le_bytes(bytes)
-    };
     let tail = message.len() - NUMBER_BYTES;
-    let number = number_at(0);
-    let torn = number != number_at(tail)
-        || number % LOOK_EVERY == 0 && message[NUMBER_BYTES + 1..tail].iter().any(|byte| *byte != FILLER);
+    let number = number_at(message, 0);
+    let torn = number != number_at(message, tail)
+        || number.is_multiple_of(LOOK_EVERY) && message[NUMBER_BYTES + 1..tail].iter().any(|byte| *byte != FILLER);
     if torn {
         return Err(Failure::Failed(format!("message {number} is damaged")));
     }

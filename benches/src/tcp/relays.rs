@@ -11,7 +11,7 @@ use super::door::{Door, Hall, MailboxDoor};
 use super::systems::free_address;
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use rohrpost_bench_local::harness::{
-    Cell, Child, End, Failure, Gate, Link, OrFail, Scratch, Shared, settle, time_two_processes,
+    Cell, Child, End, Failure, Gate, Link, OrFail, Scratch, Shared, check_children, settle, time_two_processes,
 };
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -69,9 +69,7 @@ fn time<D: Door, M: Link>(
     gate.meet_children(&mut relays)?;
     let timed = time_two_processes(cell, |end, _| module(end));
     // One ends only when it fails, or when another does.
-    while let Some(at) = relays.iter_mut().position(|relay| relay.has_ended() == Ok(true)) {
-        relays.swap_remove(at).finish(Instant::now())?;
-    }
+    check_children(&mut relays)?;
     timed
 }
 

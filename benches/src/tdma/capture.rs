@@ -4,13 +4,13 @@ use super::filter;
 use super::plan::PORT;
 use super::stage::Stage;
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable};
+use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable, check_children};
 use rohrpost_mailbox::{Name, Type};
 use rohrpost_routers::frame::Frame;
 use rohrpost_routers::lab;
 use rohrpost_routers::time::message::TimeMessage;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Most frames, and most packages of declared flows, of one turn.
 const FRAMES_MAX: usize = 1 << 20;
@@ -131,10 +131,7 @@ impl Capture {
         if self.len() == FRAMES_MAX || self.seen.arrivals.load(Ordering::Acquire) as usize == ARRIVALS_MAX {
             return Err(Failure::Failed("more crossed the bridge than there is room for".into()));
         }
-        for watcher in self.watcher.extract_if(.., |watcher| watcher.has_ended() != Ok(false)) {
-            watcher.finish(Instant::now())?;
-        }
-        Ok(())
+        check_children(&mut self.watcher)
     }
 }
 

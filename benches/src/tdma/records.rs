@@ -3,14 +3,14 @@
 use super::plan::replica_of;
 use super::routers::Routers;
 use super::stage::NODES;
-use crate::lan::flow::{FILLER, Outlet, checked, put_number};
+use crate::lan::flow::{FILLER, Outlet, checked};
 use crate::lan::records::{self, RecordInlet, RecordOutlet};
-use crate::one_way::Sink;
+use crate::one_way::{Sink, put_number};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable};
+use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable, check_children};
 use rohrpost_mailbox::StreamShape;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// All writers and readers, and the process that starts them.
 const ALL: u32 = 2 * NODES as u32 + 1;
@@ -72,9 +72,7 @@ impl RecordTraffic {
     /// # Errors
     /// What one of the processes failed with.
     pub fn came(&mut self) -> Result<[u64; NODES as usize], Failure> {
-        for child in self.children.extract_if(.., |child| child.has_ended() != Ok(false)) {
-            child.finish(Instant::now())?;
-        }
+        check_children(&mut self.children)?;
         Ok(self.counts.read.each_ref().map(|read| read.load(Ordering::Acquire)))
     }
 }

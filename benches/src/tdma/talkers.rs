@@ -9,7 +9,7 @@ use super::routers::Routers;
 use super::stage::NODES;
 use crate::lan::ends::{LanSink, LanSource};
 use rohrpost_bench_local::Failure;
-use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable};
+use rohrpost_bench_local::harness::{Child, Gate, Shared, Zeroable, check_children};
 use rohrpost_mailbox::{Name, monotonic_ns};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -80,9 +80,7 @@ impl Talkers {
         while !is_over(&self.counts) && Instant::now() < give_up {
             std::thread::sleep(EAR_EACH);
         }
-        for child in self.children.extract_if(.., |child| child.has_ended() != Ok(false)) {
-            child.finish(Instant::now())?;
-        }
+        check_children(&mut self.children)?;
         Ok(Talked { published: count(&self.counts.published), taken: count(&self.counts.taken) })
     }
 }

@@ -8,7 +8,6 @@
 //! ```
 //! The pong answers from its callback, the ping reads from the default channel, as in zenoh's own examples.
 
-use rohrpost_bench_local::OrFail;
 use rohrpost_bench_local::Failure;
 use rohrpost_bench_local::harness::{Cell, End, Link, Placement, Scheduling, ping, settle};
 use std::process::ExitCode;
@@ -100,11 +99,11 @@ struct Through {
 
 impl Link for Through {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.there.put(message).wait().or_fail("put")
+        self.there.put(message).wait().map_err(|error| Failure::of("put", error))
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
-        let came = self.subscriber.recv().or_fail("receive")?;
+        let came = self.subscriber.recv().map_err(|error| Failure::of("receive", error))?;
         let bytes = came.payload().to_bytes();
         if bytes.len() != message.len() {
             return Err(Failure::Failed(format!("{} bytes came, not {}", bytes.len(), message.len())));

@@ -162,11 +162,17 @@ impl Gate {
     /// What a child failed with that does not come, else as [`Self::meet`].
     pub fn meet_children(&self, children: &mut Vec<Child>) -> Result<(), Failure> {
         let Err(late) = self.meet(children.len() as u32 + 1) else { return Ok(()) };
-        for mut child in std::mem::take(children) {
-            if child.has_ended()? {
-                child.finish(Instant::now())?;
-            }
-        }
+        check_children(children)?;
+        children.clear();
         Err(late)
     }
+}
+
+/// Takes out those that have ended, of children that end only when they fail.
+///
+/// # Errors
+/// What the first of them failed with.
+pub fn check_children(children: &mut Vec<Child>) -> Result<(), Failure> {
+    let mut ended = children.extract_if(.., |child| child.has_ended() != Ok(false));
+    ended.try_for_each(|child| child.finish(Instant::now()))
 }

@@ -14,7 +14,7 @@ mod shared;
 
 pub use alone::{Alone, alone};
 pub use asleep::{given_away, require_asleep};
-pub use child::Child;
+pub use child::{Child, check_children};
 pub use cycles::CycleCounter;
 pub use interrupt::{heed, interrupted, look_for, rest};
 pub use machine::Machine;

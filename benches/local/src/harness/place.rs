@@ -28,12 +28,12 @@ impl End {
         }
     }
 
-    /// Its place in what both share: the near end is the first.
+    /// Index in what both share: 0 of the near end, 1 of the far one.
     pub fn index(self) -> usize {
         usize::from(self == Self::Pong)
     }
 
-    /// Its place among the two nodes of a network.
+    /// Name of the node at this end of a network.
     pub fn node(self) -> &'static str {
         if self == Self::Ping { "near" } else { "far" }
     }

@@ -89,10 +89,10 @@ impl Rate {
             )
         };
         let mut contenders = vec![
-            losses.rated("rohrpost", || ours(&apart)),
-            losses.rated(BESIDE_ROUTER, || ours(&beside)),
+            losses.rated("rohrpost", 1, || ours(&apart)),
+            losses.rated(BESIDE_ROUTER, 1, || ours(&beside)),
             losses
-                .rated("udp", || {
+                .rated("udp", 1, || {
                     let open = |end| Datagrams::open(ground.wire()?, end);
                     flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(LOOK))
                 })
@@ -120,16 +120,8 @@ fn messages(settings: &Settings) -> u64 {
 pub(super) struct Losses(RefCell<Vec<(&'static str, f64)>>);
 
 impl Losses {
+    /// `messages`: so many are one that is counted.
     pub(super) fn rated<'a>(
-        &'a self,
-        name: &'static str,
-        turn: impl Fn() -> Result<Flown, Failure> + 'a,
-    ) -> Contender<'a> {
-        self.rated_in(name, 1, turn)
-    }
-
-    /// The same, where so many messages are one that is counted.
-    pub(super) fn rated_in<'a>(
         &'a self,
         name: &'static str,
         messages: usize,

@@ -1,6 +1,7 @@
 //! How long a package is on its way between two modules while a third process records, and while none does.
 
-use super::workload::{NAME, Workload};
+use super::recorder;
+use super::workload::Workload;
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{
     Cell, Child, End, Failure, Link, Meetings, OrFail, Pause, Scratch, Shared, Zeroable, given_away, interrupted,
@@ -9,9 +10,7 @@ use rohrpost_bench_local::harness::{
 use rohrpost_bench_local::ours::{How, Mailboxes};
 use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
 use rohrpost_bench_local::settings::Settings;
-use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
-use rohrpost_schema::Type;
-use std::collections::BTreeMap;
+use rohrpost_recording::Message;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -138,11 +137,7 @@ fn while_recorded(turn: impl FnOnce() -> Result<Vec<f64>, Failure>) -> Result<Ve
 fn record(folder: &Path, shared: &RecordingTurn) -> Result<(), Failure> {
     let workload = Workload { bytes: RECORDED_BYTES, messages: usize::MAX };
     workload.prepare();
-    let options = Options { leave_bytes: 0, ..Options::new(folder, "bench") };
-    let mut writer = Writer::start(options, Session::default()).or_fail("starting a recording")?;
-    let ty = Type::List(Box::new(Type::U8));
-    let spec = ChannelSpec { name: NAME.0, item: NAME.1, ty: &ty, texts: BTreeMap::new() };
-    let channel = writer.channel(&spec).or_fail("a channel")?;
+    let (mut writer, channel) = recorder::begin(folder)?;
     let mut due = Instant::now();
     for (sequence, data) in workload.all() {
         std::thread::sleep(due.saturating_duration_since(Instant::now()));

@@ -2,7 +2,7 @@
 
 use super::workload::{NAME, Workload};
 use rohrpost_bench_local::harness::{Failure, OrFail};
-use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+use rohrpost_recording::{ChannelId, ChannelSpec, Message, Options, Session, Writer};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,13 +14,19 @@ const WAITING_MAX: usize = 8 << 20;
 const LOOK_EACH: usize = 2 << 20;
 const NAP: Duration = Duration::from_micros(200);
 
-/// Writes all, and closes the file.
-pub(super) fn write(folder: &Path, workload: &Workload) -> Result<(), Failure> {
+/// A recording with one channel.
+pub(super) fn begin(folder: &Path) -> Result<(Writer, ChannelId), Failure> {
     let options = Options { leave_bytes: 0, ..Options::new(folder, "bench") };
     let mut writer = Writer::start(options, Session::default()).or_fail("starting a recording")?;
     let ty = Type::List(Box::new(Type::U8));
     let spec = ChannelSpec { name: NAME.0, item: NAME.1, ty: &ty, texts: BTreeMap::new() };
     let channel = writer.channel(&spec).or_fail("a channel")?;
+    Ok((writer, channel))
+}
+
+/// Writes all, and closes the file.
+pub(super) fn write(folder: &Path, workload: &Workload) -> Result<(), Failure> {
+    let (mut writer, channel) = begin(folder)?;
     let mut unseen = 0;
     for (sequence, data) in workload.all() {
         unseen += data.len();

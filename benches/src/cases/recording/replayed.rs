@@ -23,7 +23,7 @@ const FILE: &str = "demo.mcap";
 /// The largest error of 99 in 100 distances, microseconds.
 const SPACING_US: f64 = 1000.0;
 
-/// The programs of all its modules are run again, one after the other, and compared.
+/// The programs of all modules of a recorded demo are run again, one after the other, and compared.
 pub(super) fn exact() -> Case {
     Case::new("exact replay of the demo", None, "s/s", |settings, subject| {
         let demo = DemoOnce::new(settings);
@@ -33,7 +33,7 @@ pub(super) fn exact() -> Case {
     })
 }
 
-/// It is played at its speed.
+/// The recording of a demo is played at its speed.
 pub(super) fn spacing() -> Case {
     Case::new("replay, error of spacing", None, "us", |settings, subject| {
         let demo = DemoOnce::new(settings);

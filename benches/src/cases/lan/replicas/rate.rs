@@ -71,7 +71,7 @@ fn measure(settings: &Settings, subject: &Subject, bytes: usize, bound: Option<T
     };
     let losses = Losses::default();
     let mut contenders = vec![
-        losses.rated("rohrpost", || {
+        losses.rated("rohrpost", 1, || {
             let (nodes, _) = ground.turn()?;
             flow(
                 &ours,
@@ -80,7 +80,7 @@ fn measure(settings: &Settings, subject: &Subject, bytes: usize, bound: Option<T
             )
         }),
         losses
-            .rated_in("udp", parts, || {
+            .rated("udp", parts, || {
                 let open = |end| Datagrams::open(ground.wire()?, end);
                 flow(
                     &raw,

@@ -1,11 +1,11 @@
 //! What crosses the wire for ten readers of one replica on one node, beside what crosses it for one: each record once.
 
 use crate::cases::lan::ground::LanSegment;
-use crate::lan::flow::{FILLER, Outlet, SILENCE, checked, put_number};
+use crate::lan::flow::{FILLER, Outlet, SILENCE, checked};
 use crate::lan::nodes::{Network, UNPACED, index};
 use crate::lan::records::{RecordInlet, RecordOutlet};
 use crate::lan::sent::Sent;
-use crate::one_way::Sink;
+use crate::one_way::{Sink, put_number};
 use rohrpost_bench_local::Case;
 use rohrpost_bench_local::harness::{Child, End, Failure, Gate, Shared, Zeroable};
 use rohrpost_bench_local::rounds::{Contender, Row, Subject, at_most, compare};
