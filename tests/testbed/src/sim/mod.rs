@@ -9,12 +9,12 @@
 //! A new protocol comes as one more [`station::Layer`]; what must hold of it as one more [`promise::Promise`].
 
 pub mod calls;
-mod chance;
-mod clock;
+pub mod chance;
+pub mod clock;
 pub mod declared;
 mod divided;
 mod edited;
-mod events;
+pub mod events;
 mod fault;
 mod faults;
 mod host;
