@@ -12,7 +12,7 @@ macro_rules! step {
 pub(crate) use step;
 
 #[cfg(feature = "crash-points")]
-pub use armed::{arm, reached, reached_count};
+pub use armed::{arm, reached};
 
 #[cfg(feature = "crash-points")]
 mod armed {
@@ -25,11 +25,6 @@ mod armed {
     pub fn arm(fatal: u64) {
         COUNT.store(0, SeqCst);
         FATAL.store(fatal, SeqCst);
-    }
-
-    /// Steps passed since [`arm`].
-    pub fn reached_count() -> u64 {
-        COUNT.load(SeqCst)
     }
 
     /// Called by each step.

@@ -75,9 +75,7 @@ fn a_package_outlives_its_receiver_once() {
 
 #[test]
 fn a_dead_sender_s_slot_comes_back_and_the_sleeping_receiver_sees_to_it() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
-    let mut sender = ground.sender();
+    let (ground, mut receiver, mut sender) = Ground::ends(shape(1));
     sender.send(&label(LOW, 1), &[]).unwrap();
     let dead = ground.start("lend");
     assert_eq!(dead.hear(), "lent");
@@ -102,8 +100,7 @@ fn a_dead_sender_s_slot_comes_back_and_the_sleeping_receiver_sees_to_it() {
 
 #[test]
 fn the_successor_of_a_dead_participant_announces_its_death() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(shape(1));
     let dead = ground.start("lend");
     assert_eq!(dead.hear(), "lent");
     dead.kill();

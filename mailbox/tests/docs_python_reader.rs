@@ -48,8 +48,7 @@ fn write(writer: &mut StreamWriter, records: &Records) {
 
 #[test]
 fn mailboxes_and_streams_are_listed_as_the_page_says() {
-    let ground = Ground::new();
-    let me = ground.join();
+    let (ground, me) = Ground::joined();
     let (_first, _second) = (me.receiver(MAILBOX, shape(4)).unwrap(), me.receiver(OTHER, shape(65)).unwrap());
     let mut sender = me.sender(OTHER).unwrap();
     sender.send(&label(LOW, 1), &[b"five!"]).unwrap();

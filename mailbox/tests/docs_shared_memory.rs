@@ -215,8 +215,7 @@ fn a_word_tells_which_package_its_own_replaces() {
 
 #[test]
 fn a_poller_says_that_it_sleeps_as_documented() {
-    let ground = Ground::new();
-    let me = ground.join();
+    let (ground, me) = Ground::joined();
     let mut receiver = me.receiver(MAILBOX, Shape::default()).unwrap();
     let mut watches = Watches::new(&me).unwrap();
     let (_far, near) = std::os::unix::net::UnixStream::pair().unwrap();
@@ -253,8 +252,7 @@ fn a_filling_word_names_its_participant() {
 
 #[test]
 fn the_node_and_its_time_are_as_documented() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let me = Participant::join(&node, Name::new(1, 200, 0, 0)).unwrap();
     me.set_state(ModuleState::Error);
     me.set_state(ModuleState::On);

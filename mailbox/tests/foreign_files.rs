@@ -134,8 +134,7 @@ fn whatever_stands_beside_the_mailboxes_stops_nobody_and_goes_with_the_node() {
     let about = format!("{:08x}.about", MAILBOX.raw());
     for name in ["traffic.0", "traffic.0.new", "time", "bell.0", "unfinished", &about] {
         for thing in &things {
-            let ground = Ground::new();
-            let node = ground.node();
+            let (ground, node) = Ground::made();
             thing.put(&ground.path().join(name));
             let what = format!("{thing:.40?} at {name}");
             let is_error = |error: &NodeError| matches!(error, NodeError::Io(path, _) if path.ends_with(name));

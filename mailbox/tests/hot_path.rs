@@ -41,8 +41,7 @@ fn many_types_and_other_descriptors_do_not_touch_the_heap() {
 }
 
 fn a_round_again_and_again(full: OverflowPolicy) {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let mut receiver = ground.join().receiver(MAILBOX, Shape { full, ..shape(8) }).unwrap();
     let mut sender = ground.sender();
     let (_far, near) = std::os::unix::net::UnixStream::pair().unwrap();

@@ -105,9 +105,7 @@ fn what_waits_and_what_is_in_hand_say_their_places_in_the_order() {
 
 #[test]
 fn inspecting_changes_nothing() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
-    let mut sender = ground.sender();
+    let (ground, mut receiver, mut sender) = Ground::ends(shape(4));
     (0..3).for_each(|id| sender.send(&label(LOW, id), &[]).unwrap());
     let _in_hand = receiver.try_receive().unwrap();
     let read = || {
@@ -124,8 +122,7 @@ fn inspecting_changes_nothing() {
 
 #[test]
 fn what_cannot_be_inspected_says_why() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     assert!(matches!(node.inspect(MAILBOX), Err(InspectError::Missing(MAILBOX))));
     fs::write(ground.path().join(format!("{:08x}.mbx", OTHER.raw())), b"a letter").unwrap();
     let told = node.inspect(OTHER).unwrap_err().to_string();

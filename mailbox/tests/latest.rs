@@ -49,8 +49,7 @@ fn role() {
 
 #[test]
 fn a_slow_reader_of_fast_writers_gets_the_newest_of_each_and_never_goes_back() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, latest(16)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(latest(16));
     let senders: Vec<Process> = (0..3).map(|_| ground.start("send states")).collect();
     let mut last: HashMap<(u32, u16), u32> = HashMap::new();
     let mut count = 0;
@@ -93,9 +92,7 @@ fn a_slow_reader_of_fast_writers_gets_the_newest_of_each_and_never_goes_back() {
 
 #[test]
 fn the_same_are_those_of_one_sender_type_and_id() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, latest(16)).unwrap();
-    let mut sender = ground.sender();
+    let (ground, mut receiver, mut sender) = Ground::ends(latest(16));
     let state = Label { from: Name::new(1, 150, 0, 0), kind: Type::data(1), id: 7, priority: LOW, ..Label::default() };
     let others = [
         Label { from: Name::new(1, 150, 1, 0), ..state },
@@ -119,8 +116,7 @@ fn the_same_are_those_of_one_sender_type_and_id() {
 
 #[test]
 fn a_fast_sender_and_a_slow_one_come_in_turn() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, latest(8)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(latest(8));
     let (mut fast, mut slow) = (ground.sender(), ground.sender());
     let mut id = 0;
     let mut flood = |fast: &mut rohrpost_mailbox::Sender| {
@@ -145,8 +141,7 @@ fn a_fast_sender_and_a_slow_one_come_in_turn() {
 
 #[test]
 fn a_restarted_sender_replaces_nothing_and_nothing_comes_back() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, latest(8)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(latest(8));
     for number in 1..=3u8 {
         let mut sender = ground.sender();
         sender.send(&label(LOW, 1), &[&[0]]).unwrap();
@@ -158,9 +153,7 @@ fn a_restarted_sender_replaces_nothing_and_nothing_comes_back() {
 
 #[test]
 fn one_slot_is_enough_and_a_loan_replaces_too() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, latest(1)).unwrap();
-    let mut sender = ground.sender();
+    let (ground, mut receiver, mut sender) = Ground::ends(latest(1));
     (1..=9u8).for_each(|number| sender.send(&label(LOW, 1), &[&[number]]).unwrap());
     assert!(matches!(ground.sender().send(&label(LOW, 1), &[]), Err(SendError::Full(_))), "it has nothing to replace");
     assert!(matches!(sender.loan(LOW), Err(SendError::Full(_))), "nor does it know yet");
@@ -182,9 +175,7 @@ fn one_slot_is_enough_and_a_loan_replaces_too() {
 
 #[test]
 fn commands_have_an_id_each_and_are_never_replaced() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, latest(4)).unwrap();
-    let mut sender = ground.sender();
+    let (ground, mut receiver, mut sender) = Ground::ends(latest(4));
     // More than it remembers, too.
     for id in 0..40 {
         sender.send(&label(LOW, id), &[]).unwrap();

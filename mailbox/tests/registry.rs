@@ -47,8 +47,7 @@ fn file_of(ground: &Ground, name: Name) -> PathBuf {
 
 #[test]
 fn whatever_comes_and_goes_raises_the_epoch() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let mut last = node.registry_epoch();
     let mut raised = |what: &str| {
         assert_ne!(node.registry_epoch(), last, "{what}");
@@ -107,8 +106,7 @@ fn without_memory_for_its_successor_a_mailbox_stays() {
 
 #[test]
 fn names_and_shapes_that_cannot_be_are_refused() {
-    let ground = Ground::new();
-    let me = ground.join();
+    let (ground, me) = Ground::joined();
     let reserved = me.receiver(Name::new(0, 200, 1, 0), shape(4)).err().unwrap();
     assert!(matches!(reserved, CreateError::Reserved(_)), "{reserved}");
     assert!(matches!(me.receiver(MAILBOX, shape(0)), Err(CreateError::Shape(MAILBOX, _))));
@@ -183,8 +181,7 @@ fn files_that_are_no_mailboxes_are_told_from_those_that_are() {
         ("an unknown policy", damaged(24, 7)),
         ("no claims", damaged(28, 0)),
     ] {
-        let ground = Ground::new();
-        let me = ground.join();
+        let (ground, me) = Ground::joined();
         fs::write(file_of(&ground, MAILBOX), bytes).unwrap();
         let error = me.sender(MAILBOX).err().unwrap();
         let why = if what == "another version" { &version } else { foreign };
@@ -221,8 +218,7 @@ fn garbage_in_the_slots_is_survived() {
 
 #[test]
 fn odd_things_in_the_directory_stop_nothing() {
-    let ground = Ground::new();
-    let me = ground.join();
+    let (ground, me) = Ground::joined();
     for name in ["1.mbx", "+1c80100.mbx", "zzz.mbx", "01C80101.mbx", "notes.txt"] {
         fs::write(ground.path().join(name), b"odd").unwrap();
     }
@@ -289,9 +285,7 @@ fn a_node_is_launched_once() {
 
 #[test]
 fn looking_changes_nothing() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
-    let mut sender = ground.sender();
+    let (ground, mut receiver, mut sender) = Ground::ends(shape(4));
     (0..3).for_each(|id| sender.send(&label(LOW, id), &[]).unwrap());
     let _in_hand = receiver.try_receive().unwrap();
     let before = fs::read(file_of(&ground, MAILBOX)).unwrap();
@@ -361,8 +355,7 @@ fn removing_and_joining_at_once_leave_no_ghosts() {
 
 #[test]
 fn words_beside_a_mailbox_are_whole_and_go_with_it() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
     assert_eq!(node.about(MAILBOX), None);
     for words in [&b"first"[..], b"", b"of another length"] {

@@ -38,8 +38,7 @@ fn a_participant_has_no_more_senders_than_claims() {
 
 #[test]
 fn a_stopped_filler_does_not_close_a_mailbox() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(2)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(shape(2));
     let filler = ground.start("hold a loan");
     assert_eq!(filler.hear(), "holding");
     filler.signal(libc::SIGSTOP);
@@ -59,9 +58,7 @@ fn a_stopped_filler_does_not_close_a_mailbox() {
 
 #[test]
 fn a_loan_dropped_unsent_is_as_if_never_lent() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
-    let mut sender = ground.sender();
+    let (ground, mut receiver, mut sender) = Ground::ends(shape(1));
     for _ in 0..100 {
         sender.loan(LOW).unwrap().body().fill(7);
     }
@@ -76,9 +73,7 @@ fn a_loan_dropped_unsent_is_as_if_never_lent() {
 
 #[test]
 fn what_is_too_large_is_refused_and_pushes_nobody_out() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
-    let mut sender = ground.sender();
+    let (_ground, mut receiver, mut sender) = Ground::ends(shape(1));
     sender.send(&label(LOW, 1), &[&[1; 256]]).unwrap();
     let error = sender.send(&label(HIGH, 2), &[&[2; 200], &[2; 57]]).unwrap_err();
     assert_eq!(
@@ -130,8 +125,7 @@ fn a_sender_moves_on_when_its_mailbox_is_replaced() {
 
 #[test]
 fn sending_to_nobody_says_so() {
-    let ground = Ground::new();
-    let participant = ground.join();
+    let (ground, participant) = Ground::joined();
     assert!(matches!(participant.sender(MAILBOX), Err(SendError::NoMailbox(MAILBOX))));
     let mut receiver = participant.receiver(MAILBOX, shape(4)).unwrap();
     let mut sender = ground.sender();

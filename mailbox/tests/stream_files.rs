@@ -192,8 +192,8 @@ fn a_file_in_a_streams_place_is_told_by_what_is_wrong_with_it_and_replaced() {
         ("too many readers", changed(READERS, &[65]), foreign.clone()),
         ("a sequence that no stream comes to", changed(FIRST, &[0xff; 8]), foreign),
     ] {
-        let ground = Ground::new();
-        let (node, me) = (ground.node(), ground.join());
+        let (ground, me) = Ground::joined();
+        let node = ground.node();
         let mut early = me.stream_reader(ID).unwrap();
         fs::write(file_of(&ground, ID), &bytes).unwrap();
         assert_eq!(bad(me.stream_reader(ID).err().unwrap()), why, "{what}");
@@ -242,8 +242,7 @@ fn what_is_said_of_a_bad_file_names_it_and_what_would_be_right() {
 fn a_bad_file_that_somebody_owns_stays_and_is_told() {
     let mut bytes = whole();
     bytes[VERSION] = 99;
-    let ground = Ground::new();
-    let me = ground.join();
+    let (ground, me) = Ground::joined();
     fs::write(file_of(&ground, ID), &bytes).unwrap();
     let owner = fs::File::options().read(true).write(true).open(file_of(&ground, ID)).unwrap();
     let first_byte = libc::flock {
@@ -273,8 +272,8 @@ fn odd_things_in_a_streams_place_stop_nobody() {
         ("a directory", &|at: &Path| fs::create_dir(at).unwrap()),
         ("a link", &|at: &Path| std::os::unix::fs::symlink("/etc/passwd", at).unwrap()),
     ] {
-        let ground = Ground::new();
-        let (node, me) = (ground.node(), ground.join());
+        let (ground, me) = Ground::joined();
+        let node = ground.node();
         put(&file_of(&ground, ID));
         for error in [me.stream_reader(ID).err().unwrap(), node.inspect_stream(ID).err().unwrap()] {
             let said = format!(
@@ -362,8 +361,7 @@ fn garbage_behind_the_first_line_of_a_stream_is_survived() {
             bytes[from..to].copy_from_slice(&with[..to - from]);
             // Not retired, or it would just be replaced.
             bytes[80..84].fill(0);
-            let ground = Ground::new();
-            let me = ground.join();
+            let (ground, me) = Ground::joined();
             fs::write(file_of(&ground, ID), &bytes).unwrap();
             use_it(&me, shape);
             // And while it is in use.

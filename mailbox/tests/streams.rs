@@ -11,7 +11,6 @@ use rohrpost_mailbox::{
     WriteError, wait_any,
 };
 use std::os::unix::fs::FileExt;
-use std::sync::Arc;
 use std::time::Duration;
 
 const ID: StreamId = StreamId { name: MAILBOX, number: 3 };
@@ -162,8 +161,7 @@ fn a_second_writer_is_refused_with_the_first_ones_name_and_process() {
 #[test]
 fn an_unfinished_record_is_nothing() {
     for shape in [SMALL, LARGE] {
-        let ground = Ground::new();
-        let participant = ground.join();
+        let (_ground, participant) = Ground::joined();
         let mut writer = participant.stream_writer(ID, shape).unwrap();
         let mut reader = participant.stream_reader(ID).unwrap();
         for _ in 0..100 {
@@ -184,8 +182,7 @@ fn an_unfinished_record_is_nothing() {
 #[test]
 fn the_writer_goes_round_what_is_held() {
     for shape in [SMALL, LARGE] {
-        let ground = Ground::new();
-        let participant = ground.join();
+        let (_ground, participant) = Ground::joined();
         let mut writer = participant.stream_writer(ID, shape).unwrap();
         let mut readers: Vec<_> = (0..shape.readers).map(|_| participant.stream_reader(ID).unwrap()).collect();
         let mut held = Vec::new();
@@ -207,8 +204,7 @@ fn the_writer_goes_round_what_is_held() {
 
 #[test]
 fn seats_are_counted_and_those_of_the_gone_are_free() {
-    let ground = Ground::new();
-    let participant = ground.join();
+    let (_ground, participant) = Ground::joined();
     let _writer = participant.stream_writer(ID, SMALL).unwrap();
     let mut readers: Vec<_> = (0..4).map(|_| participant.stream_reader(ID).unwrap()).collect();
     let error = participant.stream_reader(ID).err().unwrap();
@@ -219,8 +215,7 @@ fn seats_are_counted_and_those_of_the_gone_are_free() {
 
 #[test]
 fn readers_follow_to_a_stream_of_another_shape() {
-    let ground = Ground::new();
-    let participant = ground.join();
+    let (_ground, participant) = Ground::joined();
     let mut reader = participant.stream_reader(ID).unwrap();
     let mut newest_only = participant.stream_reader(ID).unwrap();
     assert!(matches!(reader.try_next().unwrap(), Next::Nothing), "there is no stream yet");
@@ -247,8 +242,7 @@ fn readers_follow_to_a_stream_of_another_shape() {
 /// All seats are taken, and a stream that was given up is still the one of its name.
 #[test]
 fn readers_of_a_stream_without_a_free_seat_wait_for_what_replaces_it() {
-    let ground = Ground::new();
-    let participant = ground.join();
+    let (ground, participant) = Ground::joined();
     drop(participant.stream_writer(ID, SMALL).unwrap());
     let mut readers: Vec<_> = (0..SMALL.readers).map(|_| participant.stream_reader(ID).unwrap()).collect();
     // As a successor leaves it that dies before the new one has its name.
@@ -268,8 +262,8 @@ fn readers_of_a_stream_without_a_free_seat_wait_for_what_replaces_it() {
 
 #[test]
 fn a_removed_stream_begins_anew() {
-    let ground = Ground::new();
-    let (node, participant) = (ground.node(), ground.join());
+    let (ground, participant) = Ground::joined();
+    let node = ground.node();
     let mut writer = participant.stream_writer(ID, SMALL).unwrap();
     writer.write(at(1), b"old").unwrap();
     let mut reader = participant.stream_reader(ID).unwrap();
@@ -307,8 +301,7 @@ fn stamps_behind_are_refused_and_counted_and_a_new_epoch_begins_anew() {
 
 #[test]
 fn the_two_around_a_time_or_exactly_why_not() {
-    let ground = Ground::new();
-    let participant = ground.join();
+    let (_ground, participant) = Ground::joined();
     let shape = StreamShape { keep: 16, late: Duration::from_nanos(20), ..SMALL };
     let mut reader = participant.stream_reader(ID).unwrap();
     assert_eq!(reader.around(at(1)).unwrap(), Around::Empty);
@@ -342,8 +335,7 @@ fn waits<S: Source + ?Sized>(sources: &mut [&mut S]) {
 
 #[test]
 fn one_bell_wakes_for_mailboxes_and_streams_and_watched_descriptors() {
-    let ground = Ground::new();
-    let participant: Arc<Participant> = ground.join();
+    let (ground, participant) = Ground::joined();
     let mut receiver = participant.receiver(MAILBOX, shape(4)).unwrap();
     let mut reader = participant.stream_reader(ID).unwrap();
     let mut watches = Watches::new(&participant).unwrap();

@@ -48,8 +48,7 @@ fn without_a_page_the_wall_clock_is_taken() {
 
 #[test]
 fn an_epoch_begins_with_every_step_and_time_follows_the_pace() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (_ground, node) = Ground::made();
     for (epoch, source, system_ns, pace) in
         [(1, TimeSource::Simulation, 5_000, 0.0), (2, TimeSource::Local, 9_000, 1.0), (3, TimeSource::Log, 7_000, 2.5)]
     {
@@ -92,8 +91,7 @@ fn another_pace_never_takes_time_back() {
 
 #[test]
 fn a_successor_goes_on_and_writes_nothing_that_goes_back() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (_ground, node) = Ground::made();
     let mut first = TimeKeeper::resume(&node).unwrap();
     assert_eq!(first.record(), None);
     let line = |monotonic_ns, system_ns, pace_ppb, epoch| TimeRecord {
@@ -126,8 +124,7 @@ fn a_successor_goes_on_and_writes_nothing_that_goes_back() {
 
 #[test]
 fn a_node_that_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (_ground, node) = Ground::made();
     let mut keeper = TimeKeeper::await_master(&node).unwrap();
     let unknown = keeper.record().unwrap();
     assert_eq!((unknown.epoch, unknown.source, unknown.error_ns), (0, TimeSource::Master, ERROR_UNKNOWN_NS));
@@ -142,8 +139,7 @@ fn a_node_that_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
 
 #[test]
 fn a_node_that_awaits_its_log_has_no_time_until_a_player_begins_it_and_not_that_of_an_earlier_player() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (_ground, node) = Ground::made();
     let awaits = TimeKeeper::await_source(&node, TimeSource::Log).unwrap();
     let clock = SystemClock::open(&node);
     let record = clock.record().unwrap();
@@ -251,8 +247,7 @@ fn a_clock_that_was_set_by_a_day_or_more_is_told_apart_from_one_that_drifts() {
 
 #[test]
 fn a_new_epoch_begins_ahead_or_back_from_the_same_source() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (_ground, node) = Ground::made();
     let mut keeper = TimeKeeper::begin(&node, TimeSource::Local, 5_000_000, 1.0).unwrap();
     let clock = SystemClock::open(&node);
     for (epoch, system_ns) in [(2, 1_795_733_218_000_000_000), (3, 7_000)] {

@@ -33,8 +33,7 @@ fn one(flows: Vec<FlowInfo>) -> FlowInfo {
 
 #[test]
 fn sent_is_received_and_lost_and_waiting() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let receiver = ground.join().receiver(MAILBOX, shape(16)).unwrap();
     let stop = std::sync::atomic::AtomicBool::new(false);
     let participants: Vec<_> = (0..3).map(|_| ground.join()).collect();
@@ -91,8 +90,7 @@ fn sent_is_received_and_lost_and_waiting() {
 
 #[test]
 fn times_tell_the_rate_exactly() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let mut receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
     let mut sender = ground.sender();
     let mut times = Vec::new();
@@ -123,8 +121,7 @@ fn times_tell_the_rate_exactly() {
 
 #[test]
 fn what_finds_no_row_is_counted_in_the_last_and_rows_are_used_again() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let me = ground.join();
     let _receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
     let _other = ground.join().receiver(OTHER, shape(1)).unwrap();
@@ -157,8 +154,7 @@ fn what_finds_no_row_is_counted_in_the_last_and_rows_are_used_again() {
 
 #[test]
 fn two_senders_of_one_participant_do_not_share_a_row() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let shape = rohrpost_mailbox::Shape { claims: 2, ..shape(8) };
     let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
     let me = ground.join();
@@ -182,8 +178,7 @@ fn two_senders_of_one_participant_do_not_share_a_row() {
 
 #[test]
 fn a_flow_that_lost_its_row_and_comes_back_is_another() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let me = ground.join();
     let mut receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
     let mut send = |numbers: std::ops::Range<u16>| {
@@ -217,8 +212,7 @@ fn a_flow_that_lost_its_row_and_comes_back_is_another() {
 
 #[test]
 fn a_slot_not_lent_is_counted_where_it_was_asked_for() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let _receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
     let mut sender = ground.sender();
     sender.send(&label(LOW, 0), &[]).unwrap();
@@ -233,8 +227,7 @@ const ROW: usize = 256;
 
 #[test]
 fn a_damaged_table_takes_neither_time_nor_the_reader_down() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let _participants = [ground.join(), ground.join()];
     for participant in ["traffic.0", "traffic.1"] {
         let path = ground.path().join(participant);
@@ -259,8 +252,7 @@ fn a_damaged_table_takes_neither_time_nor_the_reader_down() {
 
 #[test]
 fn values_that_find_no_row_do_not_count_as_packages() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (_ground, node) = Ground::made();
     let me = Participant::join(&node, ME).unwrap();
     for kinds in [1..128, 128..140] {
         let mut publications = Publications::new(&me);
@@ -276,8 +268,7 @@ fn values_that_find_no_row_do_not_count_as_packages() {
 
 #[test]
 fn values_published_are_told_from_packages() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (_ground, node) = Ground::made();
     let me = Participant::join(&node, ME).unwrap();
     let mut publications = Publications::new(&me);
     for age_ns in [10, 30] {
@@ -291,8 +282,7 @@ fn values_published_are_told_from_packages() {
 
 #[test]
 fn a_dead_ones_traffic_is_not_shown_and_its_successor_begins_anew() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let _receiver = ground.join().receiver(MAILBOX, shape(8)).unwrap();
     let child = ground.start("send one, then stay");
     child.hear();

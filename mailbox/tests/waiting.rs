@@ -29,9 +29,7 @@ fn role() {
 
 #[test]
 fn no_wake_up_is_ever_lost_between_two_processes() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (ground, me, mut receiver) = Ground::owned(shape(4));
     let echo = ground.start("echo");
     assert_eq!(echo.hear(), "ready");
     let mut sender = me.sender(OTHER).unwrap();
@@ -45,8 +43,7 @@ fn no_wake_up_is_ever_lost_between_two_processes() {
 
 #[test]
 fn only_what_is_more_important_ends_a_wait_for_it() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(8)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(shape(8));
     let (mut low, mut high) = (ground.sender(), ground.sender());
     let rounds = std::sync::Barrier::new(2);
     std::thread::scope(|threads| {
@@ -76,8 +73,7 @@ fn only_what_is_more_important_ends_a_wait_for_it() {
 #[test]
 fn no_wake_up_is_lost_among_many_senders() {
     const EACH: u32 = 5_000;
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(shape(4));
     let mut threads = Vec::new();
     for _ in 0..3 {
         let mut sender = ground.sender();
@@ -98,8 +94,7 @@ fn no_wake_up_is_lost_among_many_senders() {
 
 #[test]
 fn a_timeout_is_kept_and_never_early() {
-    let ground = Ground::new();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(shape(4));
     for timeout in [0, 1, 20].map(Duration::from_millis) {
         let start = Instant::now();
         assert!(receiver.receive_timeout(timeout).is_none());
@@ -113,8 +108,7 @@ fn a_timeout_is_kept_and_never_early() {
 
 #[test]
 fn one_sleep_serves_two_mailboxes() {
-    let ground = Ground::new();
-    let me = ground.join();
+    let (ground, me) = Ground::joined();
     let mut first = me.receiver(MAILBOX, shape(4)).unwrap();
     let mut second = me.receiver(OTHER, shape(4)).unwrap();
     let node = ground.node();
@@ -142,9 +136,7 @@ fn one_sleep_serves_two_mailboxes() {
 
 #[test]
 fn a_ring_ends_a_sleep_for_something_else() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (_ground, me, mut receiver) = Ground::owned(shape(4));
     let (wanted, seen) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicU32::new(0)));
     let thread = std::thread::spawn({
         let (wanted, seen) = (wanted.clone(), seen.clone());
@@ -171,9 +163,7 @@ fn a_ring_ends_a_sleep_for_something_else() {
 
 #[test]
 fn a_ring_before_the_sleep_is_not_lost() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (_ground, me, mut receiver) = Ground::owned(shape(4));
     let rung = AtomicBool::new(false);
     let start = Instant::now();
     wait_any(&mut [&mut receiver], None, || {

@@ -52,9 +52,7 @@ fn role() {
 
 #[test]
 fn either_ends_the_sleep_and_is_told_apart() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (ground, me, mut receiver) = Ground::owned(shape(4));
     let mut watches = Watches::new(&me).unwrap();
     let (mut far, mut near) = UnixStream::pair().unwrap();
     let watch = watches.add(&near, Interest::Read).unwrap();
@@ -92,9 +90,7 @@ fn either_ends_the_sleep_and_is_told_apart() {
 
 #[test]
 fn a_descriptor_is_seen_also_when_packages_leave_no_time_to_sleep() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (ground, me, mut receiver) = Ground::owned(shape(4));
     let mut watches = Watches::new(&me).unwrap();
     let (mut far, near) = UnixStream::pair().unwrap();
     let watch = watches.add(&near, Interest::Read).unwrap();
@@ -106,9 +102,7 @@ fn a_descriptor_is_seen_also_when_packages_leave_no_time_to_sleep() {
 
 #[test]
 fn a_timeout_is_kept_in_poll_to_less_than_a_millisecond() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (_ground, me, mut receiver) = Ground::owned(shape(4));
     let mut watches = Watches::new(&me).unwrap();
     let (_far, near) = UnixStream::pair().unwrap();
     watches.add(&near, Interest::Read).unwrap();
@@ -127,9 +121,7 @@ fn a_timeout_is_kept_in_poll_to_less_than_a_millisecond() {
 #[test]
 fn no_wake_up_is_lost_between_many_ringers_and_a_poller() {
     const ROUNDS: u32 = 3_000;
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(8)).unwrap();
+    let (ground, me, mut receiver) = Ground::owned(shape(8));
     let (mut far, mut near) = UnixStream::pair().unwrap();
     near.set_nonblocking(true).unwrap();
     let (received, read) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicU32::new(0)));
@@ -177,8 +169,7 @@ fn no_wake_up_is_lost_between_many_ringers_and_a_poller() {
 
 #[test]
 fn a_death_in_poll_does_no_harm() {
-    let ground = Ground::new();
-    let node = ground.node();
+    let (ground, node) = Ground::made();
     let sleeper = ground.start("sleep in poll");
     assert_eq!(sleeper.hear(), "about to sleep");
     until("it polls", || word(&ground, POLLING) == 1);
@@ -241,9 +232,7 @@ fn send_without_descriptors(ground: &Ground) {
 
 #[test]
 fn a_ringer_that_cannot_open_the_pipe_wakes_the_poller() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (ground, me, mut receiver) = Ground::owned(shape(4));
     let (_far, near) = UnixStream::pair().unwrap();
     let mut watches = Watches::new(&me).unwrap();
     watches.add(&near, Interest::Read).unwrap();
@@ -262,9 +251,7 @@ fn a_ringer_that_cannot_open_the_pipe_wakes_the_poller() {
 
 #[test]
 fn a_poller_naps_on_while_nobody_rings() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (_ground, me, mut receiver) = Ground::owned(shape(4));
     let (_far, near) = UnixStream::pair().unwrap();
     let mut watches = Watches::new(&me).unwrap();
     watches.add(&near, Interest::Read).unwrap();
@@ -276,8 +263,7 @@ fn a_poller_naps_on_while_nobody_rings() {
 
 #[test]
 fn the_pipe_is_there_as_long_as_somebody_watches() {
-    let ground = Ground::new();
-    let me = ground.join();
+    let (ground, me) = Ground::joined();
     assert!(!pipe(&ground).exists());
     let watches = Watches::new(&me).unwrap();
     assert!(pipe(&ground).exists());
@@ -292,8 +278,7 @@ fn the_pipe_is_there_as_long_as_somebody_watches() {
 
 #[test]
 fn there_is_room_for_so_many_and_no_more() {
-    let ground = Ground::new();
-    let me = ground.join();
+    let (_ground, me) = Ground::joined();
     let mut watches = Watches::new(&me).unwrap();
     let (_far, near) = UnixStream::pair().unwrap();
     let all: Vec<_> = (0..WATCHES_MAX).map(|_| watches.add(&near, Interest::Both).unwrap()).collect();
@@ -307,9 +292,7 @@ fn there_is_room_for_so_many_and_no_more() {
 
 #[test]
 fn a_sender_rings_no_receiver_that_spins() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(shape(4));
     let mut sender = ground.sender();
     let looks = Arc::new(AtomicU32::new(0));
     let spinner = std::thread::spawn({
@@ -333,9 +316,7 @@ fn a_sender_rings_no_receiver_that_spins() {
 
 #[test]
 fn a_receiver_that_has_spun_long_enough_sleeps_until_the_deadline() {
-    let ground = Ground::new();
-    let me = ground.join();
-    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (ground, _me, mut receiver) = Ground::owned(shape(4));
     let (spin, timeout) = (Duration::from_millis(2), Duration::from_millis(20));
     let waiting = Waiting { spin, ..timeout.into() };
     // A computer that stands still while it spins leaves it nothing to sleep.

@@ -13,7 +13,7 @@ pub(crate) mod small_memory;
 pub(crate) mod stream_load;
 
 use rohrpost_mailbox::{
-    Label, Loss, MailboxInfo, Name, Node, OverflowPolicy, Participant, Priority, Sender, Shape, Type,
+    Label, Loss, MailboxInfo, Name, Node, OverflowPolicy, Participant, Priority, Receiver, Sender, Shape, Type,
 };
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -44,6 +44,34 @@ pub(crate) struct Ground {
 impl Ground {
     pub(crate) fn new() -> Self {
         Self::within(tempfile::tempdir().unwrap())
+    }
+
+    /// One that is there.
+    pub(crate) fn made() -> (Self, Arc<Node>) {
+        let ground = Self::new();
+        let node = ground.node();
+        (ground, node)
+    }
+
+    /// One with a participant.
+    pub(crate) fn joined() -> (Self, Arc<Participant>) {
+        let ground = Self::new();
+        let me = ground.join();
+        (ground, me)
+    }
+
+    /// One with [`MAILBOX`], its owner and its receiver.
+    pub(crate) fn owned(shape: Shape) -> (Self, Arc<Participant>, Receiver) {
+        let (ground, me) = Self::joined();
+        let receiver = me.receiver(MAILBOX, shape).unwrap();
+        (ground, me, receiver)
+    }
+
+    /// One with both ends of [`MAILBOX`], of a participant each.
+    pub(crate) fn ends(shape: Shape) -> (Self, Receiver, Sender) {
+        let (ground, _, receiver) = Self::owned(shape);
+        let sender = ground.sender();
+        (ground, receiver, sender)
     }
 
     pub(crate) fn within(directory: TempDir) -> Self {

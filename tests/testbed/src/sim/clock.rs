@@ -3,24 +3,24 @@
 
 /// Both clocks at one moment, and the truth, which no core may see.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(crate) struct Now {
+pub struct Now {
     /// The simulation's own time, ns.
-    pub(crate) true_ns: u64,
+    pub true_ns: u64,
     /// The computer's monotonic clock, which runs on while it sleeps, ns.
-    pub(crate) monotonic_ns: u64,
+    pub monotonic_ns: u64,
     /// The one that nobody slews, and that stands still while it sleeps, ns.
-    pub(crate) unslewed_ns: u64,
+    pub unslewed_ns: u64,
     /// For how long it has slept, as it says, ns.
-    pub(crate) slept_ns: u64,
+    pub slept_ns: u64,
     /// Its CLOCK_REALTIME, ns since 1970.
-    pub(crate) realtime_ns: u64,
+    pub realtime_ns: u64,
 }
 
 const BILLION: i128 = 1_000_000_000;
 
 /// The oscillator of one computer.
 #[derive(Clone, Debug)]
-pub(crate) struct Clock {
+pub struct Clock {
     /// Where the present rate began: true and monotonic time.
     true_ns: u64,
     monotonic_ns: u64,
@@ -35,14 +35,14 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// A clock that shows `monotonic_ns` and `realtime_ns` at true time 0.
-    pub(crate) fn new(monotonic_ns: u64, realtime_ns: u64, rate_ppb: i64) -> Self {
+    pub fn new(monotonic_ns: u64, realtime_ns: u64, rate_ppb: i64) -> Self {
         let realtime_less_monotonic_ns = realtime_ns.wrapping_sub(monotonic_ns).cast_signed();
         let (slewed_ppb, unslewed_ns, slept_ns) = (0, monotonic_ns, 0);
         Self { true_ns: 0, monotonic_ns, rate_ppb, slewed_ppb, unslewed_ns, slept_ns, realtime_less_monotonic_ns }
     }
 
     /// What it shows at a true time; before the last change of its rate, as if that had always been so.
-    pub(crate) fn at(&self, true_ns: u64) -> Now {
+    pub fn at(&self, true_ns: u64) -> Now {
         let since = i128::from(true_ns) - i128::from(self.true_ns);
         let fast = |ppb: i64| since * i128::from(ppb) / BILLION;
         let monotonic_ns = (i128::from(self.monotonic_ns) + since + fast(self.rate_ppb + self.slewed_ppb)) as u64;
@@ -52,7 +52,7 @@ impl Clock {
     }
 
     /// The true time at which it shows at least `monotonic_ns`, not before `true_ns`.
-    pub(crate) fn when(&self, monotonic_ns: u64, true_ns: u64) -> u64 {
+    pub fn when(&self, monotonic_ns: u64, true_ns: u64) -> u64 {
         let wait = i128::from(monotonic_ns.saturating_sub(self.at(true_ns).monotonic_ns));
         let fast_ppb = i128::from(self.rate_ppb + self.slewed_ppb);
         let slow = -wait * fast_ppb / BILLION;
@@ -63,8 +63,13 @@ impl Clock {
         u64::try_from(i128::from(true_ns) + wait + slow + rounding).unwrap_or(u64::MAX)
     }
 
+    /// How much it runs fast, ns a second.
+    pub fn rate_ppb(&self) -> i64 {
+        self.rate_ppb
+    }
+
     /// From now on it runs so much fast.
-    pub(crate) fn set_rate(&mut self, true_ns: u64, rate_ppb: i64) {
+    pub fn set_rate(&mut self, true_ns: u64, rate_ppb: i64) {
         let now = self.at(true_ns);
         (self.monotonic_ns, self.unslewed_ns) = (now.monotonic_ns, now.unslewed_ns);
         self.true_ns = true_ns;
@@ -72,24 +77,26 @@ impl Clock {
     }
 
     /// From now on somebody slews it by so much, ns a second.
-    pub(crate) fn slew(&mut self, true_ns: u64, slewed_ppb: i64) {
+    pub fn slew(&mut self, true_ns: u64, slewed_ppb: i64) {
         self.set_rate(true_ns, self.rate_ppb);
         self.slewed_ppb = slewed_ppb;
     }
 
     /// The computer wakes up: it has slept for so long until now, and what it takes for that is so much more.
-    pub(crate) fn wakes(&mut self, true_ns: u64, slept_ns: u64, wrong_ns: i64) {
+    pub fn wakes(&mut self, true_ns: u64, slept_ns: u64, wrong_ns: i64) {
         self.set_rate(true_ns, self.rate_ppb);
         self.unslewed_ns -= slept_ns;
         self.slept_ns = (self.slept_ns + slept_ns).saturating_add_signed(wrong_ns);
         self.monotonic_ns = self.monotonic_ns.saturating_add_signed(wrong_ns);
     }
 
-    pub(crate) fn is_slewed(&self) -> bool {
+    /// Whether somebody slews it.
+    pub fn is_slewed(&self) -> bool {
         self.slewed_ppb != 0
     }
 
-    pub(crate) fn step_realtime(&mut self, by_ns: i64) {
+    /// Somebody sets CLOCK_REALTIME.
+    pub fn step_realtime(&mut self, by_ns: i64) {
         self.realtime_less_monotonic_ns += by_ns;
     }
 }

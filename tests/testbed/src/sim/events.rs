@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 /// Events by time, and at one moment in the order in which they were planned.
 #[derive(Debug)]
-pub(crate) struct Events<E> {
+pub struct Events<E> {
     waiting: BinaryHeap<Reverse<Entry<E>>>,
     ticket: u64,
 }
@@ -18,13 +18,13 @@ impl<E> Default for Events<E> {
 
 impl<E> Events<E> {
     /// Something happens at this time.
-    pub(crate) fn push(&mut self, at_ns: u64, event: E) {
+    pub fn push(&mut self, at_ns: u64, event: E) {
         self.ticket += 1;
         self.waiting.push(Reverse(Entry { at_ns, ticket: self.ticket, event }));
     }
 
     /// The next event, and when it happens.
-    pub(crate) fn pop(&mut self) -> Option<(u64, E)> {
+    pub fn pop(&mut self) -> Option<(u64, E)> {
         self.waiting.pop().map(|Reverse(entry)| (entry.at_ns, entry.event))
     }
 }

@@ -110,8 +110,10 @@ impl World<'_> {
                 self.oracle.saw("strayed");
                 let first = self.chance.pick(&[RouterPort::Rest, RouterPort::Replicas]).first_sequence();
                 let first = first + self.chance.below(1 << 20);
+                let life = self.stations[from].router.as_ref().map_or(0, |router| router.life);
+                let its = incarnation(self.plan.seed, life);
                 for sequence in first..first + count {
-                    let arrived = made(0, Some(from), self.alive(from, to, sequence));
+                    let arrived = made(0, Some(from), self.alive((from, to), its, sequence, 0));
                     let at_ns = self.now_ns + self.chance.below(50 * MS);
                     self.at(at_ns, Event::Arrive { to, arrived });
                 }
@@ -250,7 +252,7 @@ impl World<'_> {
         if chance.percent(30) {
             let head = FrameHead {
                 kind: FrameKind::Refusal,
-                system: super::plan::SYSTEM,
+                system: SYSTEM,
                 from: from as u8,
                 to: to as u8,
                 digest: chance.bits(),
@@ -270,32 +272,24 @@ impl World<'_> {
         // Far from all that is sent in these seconds.
         let any = chance.between(1 << 32, SEQUENCE_MAX);
         let sequence = chance.pick(&[SEQUENCE_MAX, SEQUENCE_MAX / 2, any]);
-        let head = FrameHead {
-            kind: FrameKind::Alive,
-            system: super::plan::SYSTEM,
-            from: from as u8,
-            to: to as u8,
-            digest: digest(self.stations[to].edition),
-            incarnation: if is_of_incarnation { incarnation(self.plan.seed, life) } else { chance.bits() | 1 },
-            sequence: if is_of_incarnation { sequence } else { chance.below(1 << 20) },
-        };
-        let rest = Alive { heard_incarnation: chance.bits(), ..Alive::default() }.to_bytes();
-        Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat())
+        let incarnation = if is_of_incarnation { incarnation(self.plan.seed, life) } else { chance.bits() | 1 };
+        let sequence = if is_of_incarnation { sequence } else { chance.below(1 << 20) };
+        let heard_incarnation = chance.bits();
+        self.alive((from, to), incarnation, sequence, heard_incarnation)
     }
 
-    /// "Still there", of the present incarnation of a node.
-    fn alive(&self, from: usize, to: usize, sequence: u64) -> Rc<[u8]> {
-        let life = self.stations[from].router.as_ref().map_or(0, |router| router.life);
+    /// "Still there", from a node to a node.
+    fn alive(&self, (from, to): (usize, usize), incarnation: u64, sequence: u64, heard_incarnation: u64) -> Rc<[u8]> {
         let head = FrameHead {
             kind: FrameKind::Alive,
-            system: super::plan::SYSTEM,
+            system: SYSTEM,
             from: from as u8,
             to: to as u8,
             digest: digest(self.stations[to].edition),
-            incarnation: incarnation(self.plan.seed, life),
+            incarnation,
             sequence,
         };
-        let rest = Alive::default().to_bytes();
+        let rest = Alive { heard_incarnation, ..Alive::default() }.to_bytes();
         Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat())
     }
 
@@ -319,7 +313,7 @@ impl World<'_> {
                 FrameKind::Sync,
                 FrameKind::Reply,
             ]),
-            system: if chance.percent(20) { 9 } else { super::plan::SYSTEM },
+            system: if chance.percent(20) { 9 } else { SYSTEM },
             from: if chance.percent(20) { chance.below(256) as u8 } else { from },
             to: if chance.percent(20) { chance.below(256) as u8 } else { to as u8 },
             // Never the right one.

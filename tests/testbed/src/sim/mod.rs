@@ -14,7 +14,7 @@ pub mod clock;
 pub mod declared;
 mod divided;
 mod edited;
-mod events;
+pub mod events;
 mod fault;
 mod faults;
 mod host;

@@ -85,26 +85,21 @@ pub(crate) const SEEN_IN_A_HUNDRED_EDITED: [(&str, u64); 4] =
 pub(crate) const SEEN_IN_A_HUNDRED_UNSTEADY: [(&str, u64); 4] =
     [("asleep", 30), ("slewed", 30), ("time: unsteady", 60), ("delivered", 20_000)];
 /// The same of replicas.
-pub(crate) const SEEN_IN_A_HUNDRED_REPLICATED: [(&str, u64); 9] = [
-    ("delivered", 50_000),
-    ("a record written", 10_000),
-    ("a record read", 10_000),
-    ("a reader is told of lost records", 1_000),
-    ("a part of a record", 20_000),
-    ("a part of a record again", 20),
-    ("a request for parts", 20),
-    ("a writer restarts", 40),
-    ("hostile parts", 4),
-];
+pub(crate) const SEEN_IN_A_HUNDRED_REPLICATED: [(&str, u64); 9] = replicated(50_000);
 /// The same of replicas in time slots.
-pub(crate) const SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED: [(&str, u64); 9] = [
-    ("delivered", 5_000),
-    ("a record written", 10_000),
-    ("a record read", 10_000),
-    ("a reader is told of lost records", 1_000),
-    ("a part of a record", 20_000),
-    ("a part of a record again", 20),
-    ("a request for parts", 20),
-    ("a writer restarts", 40),
-    ("hostile parts", 4),
-];
+pub(crate) const SEEN_IN_A_HUNDRED_REPLICATED_SLOTTED: [(&str, u64); 9] = replicated(5_000);
+
+/// With so many packages beside.
+const fn replicated(delivered: u64) -> [(&'static str, u64); 9] {
+    [
+        ("delivered", delivered),
+        ("a record written", 10_000),
+        ("a record read", 10_000),
+        ("a reader is told of lost records", 1_000),
+        ("a part of a record", 20_000),
+        ("a part of a record again", 20),
+        ("a request for parts", 20),
+        ("a writer restarts", 40),
+        ("hostile parts", 4),
+    ]
+}
