@@ -1,87 +1,16 @@
-//! The settings of the player, as `rohrpost replay` writes them into the configuration of its node.
+//! The settings of the player, as `rohrpost replay` makes them.
 
 use super::configuration::PlayedModules;
 use super::recorded::RecordedFiles;
 use crate::record::PartArguments;
 use crate::terminal::{Failure, say};
-use rohrpost_recorder::player::{ROUND_MIN, RecordingPath};
+use rohrpost_recorder::player::{PlayerSettings, ROUND_MIN, RecordingPath};
 use rohrpost_recording::Selection;
-<<<<<<< HEAD
 use std::path::Path;
-=======
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
-use std::ffi::OsString;
-use std::os::unix::ffi::OsStringExt;
-use std::path::{Path, PathBuf};
->>>>>>> small6
 use std::time::Duration;
-
-<<<<<<< HEAD
-/// What the command line says of the course.
-pub(super) struct WantedCourse<'a> {
-    pub(super) part: &'a PartArguments,
-    pub(super) rate: f64,
-    pub(super) repeats: bool,
-}
-
-/// The player's settings, and files with the descriptions.
-=======
-/// A round takes so long at least, also if what is repeated is shorter: rounds of no length would take a processor.
-pub(super) const ROUND_MIN: Duration = Duration::from_millis(100);
-
-/// What `rohrpost replay` writes into the configuration of its node.
-#[derive(Deserialize, Serialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) struct PlayerSettings {
-    /// The recording, in order.
-    pub(super) files: Vec<RecordingPath>,
-    /// When the recording begins and ends, ns since 1970.
-    pub(super) begin_ns: u64,
-    pub(super) end_ns: u64,
-    /// Names that it stands in for, and files with their descriptions.
-    pub(super) described: Vec<(String, String)>,
-    /// What it plays.
-    pub(super) topics: BTreeSet<String>,
-    /// Topics of another program, and those in which their messages are played as bytes.
-    pub(super) into: Vec<(String, String)>,
-    /// The file with the answers of modules.
-    pub(super) answers: Option<String>,
-    /// Times the recorded speed.
-    pub(super) rate: f64,
-    pub(super) from_ns: Option<u64>,
-    pub(super) until_ns: Option<u64>,
-    #[serde(default)]
-    pub(super) repeats: bool,
-}
-
-/// Where a recording is. Names of files are bytes, and configurations are texts: of a name that is no text they have
-/// the numbers of its bytes.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(untagged)]
-pub(super) enum RecordingPath {
-    Text(String),
-    Bytes(Vec<u8>),
-}
-
-impl From<PathBuf> for RecordingPath {
-    fn from(path: PathBuf) -> Self {
-        path.into_os_string().into_string().map_or_else(|name| Self::Bytes(name.into_vec()), Self::Text)
-    }
-}
-
-impl From<RecordingPath> for PathBuf {
-    fn from(path: RecordingPath) -> Self {
-        match path {
-            RecordingPath::Text(text) => text.into(),
-            RecordingPath::Bytes(bytes) => OsString::from_vec(bytes).into(),
-        }
-    }
-}
 
 /// The player's settings, and files with the descriptions. Of the command line: which part, at which rate, and whether
 /// over and over.
->>>>>>> small6
 pub(super) fn made(
     (part, rate, repeats): (&PartArguments, f64, bool),
     recorded: &RecordedFiles,
@@ -146,22 +75,3 @@ fn note_short_rounds(recorded: &RecordedFiles, played: &PlayedModules, part: &Se
         say(format_args!("--loop: what is repeated lasts {lasts:?}; each round takes {ROUND_MIN:?} at least"));
     }
 }
-<<<<<<< HEAD
-=======
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeMap;
-
-    #[test]
-    fn a_recording_may_have_any_name() {
-        for name in [&b"main-0001.mcap"[..], b"T\xfcr.mcap", b"\xff", "T\u{fc}r.mcap".as_bytes()] {
-            let path = PathBuf::from(OsString::from_vec(name.to_vec()));
-            let written = toml::to_string(&BTreeMap::from([("file", RecordingPath::from(path.clone()))]));
-            let mut read: BTreeMap<String, RecordingPath> = toml::from_str(&written.unwrap()).unwrap();
-            assert_eq!(PathBuf::from(read.remove("file").unwrap()), path);
-        }
-    }
-}
->>>>>>> small6

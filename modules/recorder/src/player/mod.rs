@@ -17,7 +17,7 @@ mod settings;
 mod spacing;
 
 pub use answers::JournalAnswers;
-pub use settings::{ROUND_MIN, RecordingPath};
+pub use settings::{PlayerSettings, ROUND_MIN, RecordingPath};
 
 use answers::PlayedAnswers;
 use channels::PlayedChannels;
@@ -34,7 +34,6 @@ use rohrpost::{
 };
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_recording::{Player, RecordedChannel};
-use settings::PlayerSettings;
 use spacing::{PlayedAt, ProcessorWaits, Spacing};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};

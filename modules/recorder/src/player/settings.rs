@@ -1,44 +1,47 @@
 //! The settings of the player, which `rohrpost replay` writes into the configuration of its node.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStringExt;
 use std::path::PathBuf;
 use std::time::Duration;
-use toml::Value;
 
 /// A round takes so long at least, also if what is repeated is shorter: rounds of no length would take a processor.
 pub const ROUND_MIN: Duration = Duration::from_millis(100);
 
 /// What `rohrpost replay` writes into the configuration of its node.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) struct PlayerSettings {
+pub struct PlayerSettings {
     /// The recording, in order.
-    pub(super) files: Vec<RecordingPath>,
-    /// When the recording begins and ends, ns since 1970.
-    pub(super) begin_ns: u64,
-    pub(super) end_ns: u64,
+    pub files: Vec<RecordingPath>,
+    /// When the recording begins, ns since 1970.
+    pub begin_ns: u64,
+    /// When it ends, likewise.
+    pub end_ns: u64,
     /// Names that it stands in for, and files with their descriptions.
-    pub(super) described: Vec<(String, String)>,
+    pub described: Vec<(String, String)>,
     /// What it plays.
-    pub(super) topics: BTreeSet<String>,
+    pub topics: BTreeSet<String>,
     /// Topics of another program, and those in which their messages are played as bytes.
-    pub(super) into: Vec<(String, String)>,
+    pub into: Vec<(String, String)>,
     /// The file with the answers of modules.
-    pub(super) answers: Option<String>,
+    pub answers: Option<String>,
     /// Times the recorded speed.
-    pub(super) rate: f64,
-    pub(super) from_ns: Option<u64>,
-    pub(super) until_ns: Option<u64>,
+    pub rate: f64,
+    /// The part that is played: from when on, and up to when.
+    pub from_ns: Option<u64>,
+    /// See `from_ns`.
+    pub until_ns: Option<u64>,
+    /// Whether it begins again at its end.
     #[serde(default)]
-    pub(super) repeats: bool,
+    pub repeats: bool,
 }
 
 /// Where a recording is. Names of files are bytes, and configurations are texts: of a name that is no text they have
 /// the numbers of its bytes.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(untagged)]
 pub enum RecordingPath {
     /// One that is a text.
@@ -62,28 +65,17 @@ impl From<RecordingPath> for PathBuf {
     }
 }
 
-impl From<RecordingPath> for Value {
-    fn from(path: RecordingPath) -> Self {
-        match path {
-            RecordingPath::Text(text) => text.into(),
-            RecordingPath::Bytes(bytes) => bytes.into_iter().map(i64::from).collect::<Vec<_>>().into(),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use toml::Table;
+    use std::collections::BTreeMap;
 
     #[test]
     fn a_recording_may_have_any_name() {
         for name in [&b"main-0001.mcap"[..], b"T\xfcr.mcap", b"\xff", "T\u{fc}r.mcap".as_bytes()] {
             let path = PathBuf::from(OsString::from_vec(name.to_vec()));
-            let written =
-                toml::to_string(&Table::from_iter([("file".to_owned(), RecordingPath::from(path.clone()).into())]));
-            let mut read: std::collections::BTreeMap<String, RecordingPath> =
-                toml::from_str(&written.unwrap()).unwrap();
+            let written = toml::to_string(&BTreeMap::from([("file", RecordingPath::from(path.clone()))]));
+            let mut read: BTreeMap<String, RecordingPath> = toml::from_str(&written.unwrap()).unwrap();
             assert_eq!(PathBuf::from(read.remove("file").unwrap()), path);
         }
     }
