@@ -1,7 +1,7 @@
 //! What is read of a computer: files below a root directory, and the few facts that no file holds.
 
-use super::network::LanView;
-use super::security::Protection;
+use super::lan::LanView;
+use super::protection::Protection;
 use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
 use rohrpost_mailbox::sys::{self, Room};
 use rohrpost_mailbox::{Node, NodeError, SystemClock, base_directory, monotonic_ns, realtime_ns, saturating_sum};

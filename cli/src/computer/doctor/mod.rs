@@ -2,10 +2,12 @@
 
 mod finding;
 mod kernel;
+mod lan;
 mod machine;
 mod measure;
 mod network;
 mod place;
+mod protection;
 mod rights;
 mod security;
 
@@ -13,8 +15,8 @@ use crate::terminal::{Failure, say, say_folded};
 use finding::{Finding, Grade};
 pub(crate) use machine::room_of_nodes;
 use machine::{Machine, Needs};
+use protection::Protection;
 use rohrpost_launch::choose_node;
-use security::Protection;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -1,8 +1,8 @@
 //! Output of `doctor` for recorded computers and networks.
 
+use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use super::machine::{Bridge, KernelFacts, NodeDirectory, NodeFound, StreamsFound};
-use super::network::{LanView, PeerNode, Port, PortState, Reach, Stamps};
-use super::security::{LanProtection, Tcp};
+use super::protection::{LanProtection, Tcp};
 use super::*;
 use rohrpost_mailbox::{LAYOUT_VERSION, NodeError, sys::Room};
 use std::fs;

@@ -1,6 +1,6 @@
 //! Probes how this computer is connected to the other nodes. Each peer gets one empty datagram, which a router ignores.
 
-use super::{LanView, PeerNode, Port, PortState, Reach, Stamps};
+use crate::computer::doctor::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use nix::errno::Errno;
 use nix::ifaddrs::getifaddrs;
 use nix::net::if_::InterfaceFlags;
