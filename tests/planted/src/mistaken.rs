@@ -23,8 +23,8 @@ pub struct Mistaken<'a> {
 
 impl Mistaken<'_> {
     /// Writes the copies, and `mistaken.rs`, which the crate includes: with a test of the name of each mistake, that
-    /// calls `noticed::is_noticed`. A change of the sources that leaves a mistake behind is an error of these tests, not
-    /// of everybody's build.
+    /// calls `noticed::is_noticed`. A change of the sources that leaves a mistake behind is an error of these tests and
+    /// not of the build.
     ///
     /// # Panics
     /// Outside of a build script.
