@@ -103,7 +103,7 @@ const LONG: &[(&str, usize)] = &[
     ("routers/src/time/clock/slots.rs", 437),
     ("routers/src/time/election.rs", 408),
     ("routers/tests/shell.rs", 410),
-    ("tests/e2e/probe.rs", 413),
+    ("tests/e2e/probe.rs", 405),
 ];
 
 #[test]

@@ -22,8 +22,8 @@ use std::time::Duration;
 
 const ROLE: &str = "ROHRPOST_RECORDED_DISK";
 const PYTHON: &str = "ROHRPOST_MCAP_PYTHON";
-/// 64 MiB: six seconds of what is sent.
-const DISK_PAGES: usize = 16_384;
+/// 256 MiB: 24 seconds of what is sent. A machine that is slower than that lets it run full in the wrong rounds, too.
+const DISK_PAGES: usize = 65_536;
 const TOPICS: [&str; 2] = ["feeder.0/count", "feeder.0/frame"];
 /// More than it ever sends.
 const ENDLESS: &str = "1000000000";

@@ -250,7 +250,7 @@ impl PeerSessions {
     /// Writes a hello; how long its datagram is.
     ///
     /// # Panics
-    /// Whether this incarnation has sent a peer all the hellos that it may. Only another incarnation, with other
+    /// If this incarnation has sent a peer all the hellos that it may. Only another incarnation, with other
     /// nonces, can go on. An attacker that replays a peer's challenges without end, and forges datagrams that make this
     /// node challenge and answer, 200 a second in all, gets there in 248 days; a peer that is away, in 136 years.
     pub(super) fn hello(&self, peer: NodeIndex, key: usize, hello: Hello, datagram: &mut [u8]) -> usize {

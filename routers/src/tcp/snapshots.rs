@@ -51,7 +51,7 @@ pub enum LinkState {
     Away,
     /// It has one, and is not registered.
     Joining,
-    /// Packages go both sender_cache.
+    /// Packages go both ways.
     Up,
 }
 

@@ -24,7 +24,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("node.pem");
         let mut params = CertificateParams::new(["base".into()]).unwrap();
-        // Before 2050 and from then on, the end is written in two sender_cache.
+        // Before 2050 and from then on, the end is written in two ways.
         for (year, seconds) in [(2031, 1_924_992_000), (2061, 2_871_763_200)] {
             params.not_after = date_time_ymd(year, 1, 1);
             let pem = params.self_signed(&KeyPair::generate().unwrap()).unwrap().pem();
