@@ -24,13 +24,13 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ),
     ("gui-bridge/src/files.rs", "gui-bridge/src/sink.rs", "a sink is begun with a file, and both fail alike"),
     (
-        "mailbox/src/doorbell.rs",
-        "mailbox/src/node.rs",
+        "mailbox/src/node/directory.rs",
+        "mailbox/src/wake/doorbell.rs",
         "bells are in the node's page, and a process that finds a death there rings them",
     ),
     (
-        "mailbox/src/hot.rs",
-        "mailbox/src/slots.rs",
+        "mailbox/src/slots/hot.rs",
+        "mailbox/src/slots/protocol.rs",
         "what both sides say is a part of the slot core, which the proofs take whole",
     ),
     (
@@ -94,7 +94,7 @@ const LINES_MAX: usize = 400;
 const LONG: &[(&str, usize)] = &[
     ("mailbox/proof/loom/src/models.rs", 642),
     ("mailbox/src/sender.rs", 425),
-    ("mailbox/src/slots.rs", 423),
+    ("mailbox/src/slots/protocol.rs", 423),
     ("modules/src/call/deduplicator_simulation.rs", 403),
     ("modules/src/output/way.rs", 438),
     ("modules/launch/tests/launch.rs", 404),

@@ -1,8 +1,8 @@
 //! What a sender says of a package.
 
+use crate::figures::traffic::Key;
 use crate::name::{Name, Priority};
 use crate::package::{Head, Options, Type};
-use crate::traffic::Key;
 
 /// What a sender says of a package besides its body; the mailbox's name and the length are filled in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]

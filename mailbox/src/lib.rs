@@ -43,7 +43,7 @@
 //! | | | next owner *adopts*: Ready, marked; the second time it is *poison*: Free |
 //!
 //! No process waits for another: the slot count bounds the steps of each operation, and a process that finds a word
-//! changed goes on with the next. A process may be killed between any two steps; `slots` begins with a table of what
+//! changed goes on with the next. A process may be killed between any two steps; `slots/protocol.rs` begins with what
 //! that leaves and what fixes it, and the tests in `mailbox/proof` visit each step by its name.
 //!
 //! # Decisions
@@ -58,13 +58,13 @@
 //!
 //! # Reading order
 //!
-//! 1. `word`, `slots`, `hot`: the protocol. `queue`: what the receiver knows. `latest`: what replaces what.
-//! 2. `bell`, `doorbell`, `waiting`, `watch`: sleeping and waking.
-//! 3. `layout`, `segment`, `memory`: the bytes, and the only addresses. `sync`: atomics and fences.
-//! 4. `label`, `sender`, `send_error`, `place`, `receiver`: what users hold; `routes`: what is on other nodes.
-//!    `node`, `entry`, `participant`, `lock`, `process`, `registry`, `unlink`: live processes and their names.
-//! 5. `stream`: rings of stamped records. `owned`: what their files and those of mailboxes have in common.
-//! 6. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
+//! 1. `slots`: the protocol of slots. `sync`: its atomics and fences. `cell`: one writer, many readers.
+//! 2. `wake`: sleeping and waking.
+//! 3. `memory`: files, bytes, the only addresses.
+//! 4. `label`, `sender`, `send_error`, `place`, `receiver`: what users hold.
+//! 5. `node`: live processes, the names of their mailboxes, and which are on other nodes.
+//! 6. `stream`: rings of stamped records.
+//! 7. `figures`: what anyone may read. `system_time`: the node's time.
 //!
 //! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes
 //! on with (H) and (I); `cell` has letters of its own.
@@ -85,40 +85,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod about;
-mod bell;
-mod beside;
-mod bodies;
 mod causes;
 mod cell;
 mod clock;
-mod counters;
-mod doorbell;
-mod entry;
-mod files;
-mod flows;
-mod full;
-mod hot;
-mod inspect;
+mod figures;
 mod label;
-mod latest;
-mod layout;
-mod lock;
-mod mapped;
 mod memory;
 mod name;
 mod node;
-mod node_error;
-mod owned;
 mod package;
-mod participant;
 mod place;
-mod process;
-mod queue;
 mod receiver;
-mod registry;
-mod routes;
-mod segment;
 mod send_error;
 mod sender;
 mod slots;
@@ -130,35 +107,31 @@ mod sync;
 pub mod sys;
 mod system_time;
 mod throttle;
-mod traffic;
-mod unlink;
-mod waiting;
-mod watch;
-mod word;
-mod work;
+mod wake;
 
 pub use cell::SeqCount;
 pub use clock::{monotonic_ns, realtime_ns, slept_ns, unslewed_ns};
-pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss, saturating_sum};
-pub use entry::{ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
-pub use flows::{FlowInfo, FlowSecond, Publications};
-pub use full::OverflowPolicy;
-pub use inspect::{InspectError, MailboxDetail, MailboxInfo, Party, SlotInfo, VictimInfo, WaitingPackage};
+pub use figures::counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss, saturating_sum};
+pub use figures::flows::{FlowInfo, FlowSecond, Publications};
+pub use figures::inspect::{InspectError, MailboxDetail, MailboxInfo, Party, SlotInfo, VictimInfo, WaitingPackage};
 pub use label::Label;
-pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
+pub use memory::layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
+pub use memory::owned::BadFile;
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
-pub use node::{LaunchLock, Node, base_directory, node_directory, remove_base_if_empty};
-pub use node_error::NodeError;
-pub use owned::BadFile;
+pub use node::directory::{LaunchLock, Node, base_directory, node_directory, remove_base_if_empty};
+pub use node::entry::{ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
+pub use node::error::NodeError;
+pub use node::participant::Participant;
+pub use node::process::{ParticipantProcess, ProcessError};
+pub use node::registry::CreateError;
+pub use node::routes::ROUTES_MAX;
+pub use node::work::{InHand, Work};
 pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
-pub use participant::Participant;
-pub use process::{ParticipantProcess, ProcessError};
 pub use receiver::{Package, Receiver};
-pub use registry::CreateError;
-pub use routes::ROUTES_MAX;
 pub use send_error::SendError;
 pub use sender::{Loan, Sender};
-pub use slots::SLOTS_MAX;
+pub use slots::full::OverflowPolicy;
+pub use slots::protocol::SLOTS_MAX;
 pub use stream::{
     Around, HeldRecord, Missed, Next, OpenRecord, OriginRecord, RecordInfo, RecordPlace, ReplicaError, ReplicaWriter,
     STREAM_KEEP_MAX, STREAM_READERS_MAX, STREAM_SEQUENCE_MAX, Stamp, StreamError, StreamId, StreamInfo, StreamReader,
@@ -168,6 +141,5 @@ pub use system_time::{
     CLOCK_SET_NS, ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched,
 };
 pub use throttle::Throttle;
-pub use waiting::{Source, Waiting, wait_above, wait_any};
-pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};
-pub use work::{InHand, Work};
+pub use wake::waiting::{Source, Waiting, wait_above, wait_any};
+pub use wake::watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};

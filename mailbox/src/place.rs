@@ -1,6 +1,6 @@
 //! Where a sender looks for a free slot first.
 
-use crate::word::Claimant;
+use crate::slots::word::Claimant;
 
 /// Where a sender looks for a free slot first.
 ///

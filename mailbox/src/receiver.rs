@@ -1,20 +1,20 @@
 //! The receiving side of a mailbox: read a package in place, most important first. A receiver that finds none sleeps in
 //! `waiting`.
 
-use crate::about;
 use crate::clock::monotonic_ns;
-use crate::counters::Loss;
-use crate::layout::{Shape, stored_ns};
-use crate::lock::Held;
+use crate::figures::counters::Loss;
+use crate::memory::layout::{Shape, stored_ns};
+use crate::memory::segment::Segment;
 use crate::name::{Name, Priority};
-use crate::node_error::NodeError;
+use crate::node::about;
+use crate::node::error::NodeError;
+use crate::node::lock::Held;
+use crate::node::participant::Participant;
+use crate::node::unlink;
 use crate::package::{Head, Options};
-use crate::participant::Participant;
-use crate::queue::Queue;
-use crate::segment::Segment;
-use crate::slots::Taken;
+use crate::slots::protocol::Taken;
+use crate::slots::queue::Queue;
 use crate::step::step;
-use crate::unlink;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 

@@ -1,20 +1,20 @@
 //! The sending side of a mailbox: copy a package in, or write it in place.
 
-use crate::counters::Loss;
-use crate::doorbell;
-use crate::full::NoSlot;
+use crate::figures::counters::Loss;
+use crate::figures::traffic::Writer;
 use crate::label::Label;
-use crate::latest::Posts;
+use crate::memory::owned::BadSegment;
+use crate::memory::segment::Segment;
 use crate::name::{Name, Priority};
-use crate::owned::BadSegment;
-use crate::participant::Participant;
+use crate::node::participant::Participant;
+use crate::node::routes;
 use crate::place::Place;
-use crate::routes;
-use crate::segment::Segment;
 use crate::send_error::SendError;
-use crate::slots::{Claim, Published};
+use crate::slots::full::NoSlot;
+use crate::slots::latest::Posts;
+use crate::slots::protocol::{Claim, Published};
 use crate::step::step;
-use crate::traffic::Writer;
+use crate::wake::doorbell;
 use std::sync::Arc;
 
 /// A mailbox that is replaced over and over while one package is sent: give up after so many.

@@ -11,9 +11,9 @@ pub use keeper::TimeKeeper;
 
 use crate::cell::SeqLatch;
 use crate::clock::{monotonic_ns, realtime_ns, slept_ns, slept_ns_min};
-use crate::files::{Directory, allocate};
-use crate::memory::{Mapping, Shared, Use};
-use crate::node::Node;
+use crate::memory::files::{Directory, allocate};
+use crate::memory::mapping::{Mapping, Shared, Use};
+use crate::node::directory::Node;
 use crate::step::step;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};

@@ -1,5 +1,5 @@
-//! Files of a node's directory are opened, made and removed by `mailbox/src/files.rs` alone. It asks what a file is and
-//! to which user it belongs, and follows no link.
+//! Files of a node's directory are opened, made and removed by `mailbox/src/memory/files.rs` alone. It asks what a file
+//! is and to which user it belongs, and follows no link.
 
 use std::path::Path;
 
@@ -8,11 +8,11 @@ const DIRECT: &[&str] = &["fs::", "OpenOptions", "File::open(", "File::create", 
 
 /// Sources of the mailboxes that name files themselves, and why.
 const OTHERS: &[(&str, &str)] = &[
-    ("mailbox/src/files.rs", "the place"),
-    ("mailbox/src/doorbell.rs", "opens pipes, on the stack, relative to the directory"),
+    ("mailbox/src/memory/files.rs", "the place"),
+    ("mailbox/src/wake/doorbell.rs", "opens pipes, on the stack, relative to the directory"),
     ("mailbox/src/sys.rs", "files of the system, not of a node"),
     ("mailbox/src/sys/family.rs", "the same"),
-    ("mailbox/src/process.rs", "the same: what the kernel says of a process"),
+    ("mailbox/src/node/process.rs", "the same: what the kernel says of a process"),
 ];
 
 /// The path of a file in a node's directory, as other crates would build it.
@@ -28,7 +28,7 @@ pub(crate) fn mistakes(root: &Path, file: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(file).unwrap();
     let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
     let (found, instead) = if name.starts_with("mailbox/src/") {
-        (DIRECT, "a method of `Directory` (`mailbox/src/files.rs`)")
+        (DIRECT, "a method of `Directory` (`mailbox/src/memory/files.rs`)")
     } else {
         (PATHS, "`Node::put_file` or `Node::read_file`")
     };
@@ -56,7 +56,7 @@ fn direct_ways_are_found_and_those_of_tests_are_not() {
         "use std::fs::File;\n// fs::read\nlet a = fs::read(x);\n#[cfg(test)]\nmod tests {\n    fs::read(x);\n}\n";
     let none: Vec<String> = Vec::new();
     assert_eq!(put("mailbox/src/a.rs", direct), ["mailbox/src/a.rs:3: `fs::`"]);
-    assert_eq!(put("mailbox/src/files.rs", direct), none);
+    assert_eq!(put("mailbox/src/memory/files.rs", direct), none);
     assert_eq!(put("cli/src/a.rs", direct), none, "files of other folders");
     let path = "let a = fs::read(self.node.path().join(FILE));";
     assert_eq!(put("cli/src/b.rs", path), ["cli/src/b.rs:1: `node.path().join(`"]);

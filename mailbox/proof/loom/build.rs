@@ -36,7 +36,17 @@ struct Proof {
 const PROOFS: [Proof; 3] = [
     Proof {
         real: "real",
-        parts: &["word", "full", "hot", "bodies", "slots", "queue", "bell", "rig", "models"],
+        parts: &[
+            "slots/word",
+            "slots/full",
+            "slots/hot",
+            "slots/bodies",
+            "slots/protocol",
+            "slots/queue",
+            "wake/bell",
+            "rig",
+            "models",
+        ],
         models: broken::MODELS,
         broken: broken::BROKEN,
     },

@@ -36,7 +36,18 @@ struct Proof {
 const PROOFS: [Proof; 2] = [
     Proof {
         real: "real",
-        parts: &["word", "full", "hot", "bodies", "slots", "queue", "bell", "cell", "rig", "runs"],
+        parts: &[
+            "slots/word",
+            "slots/full",
+            "slots/hot",
+            "slots/bodies",
+            "slots/protocol",
+            "slots/queue",
+            "wake/bell",
+            "cell",
+            "rig",
+            "runs",
+        ],
         broken: broken::BROKEN,
         caught: CAUGHT,
     },

@@ -1,9 +1,9 @@
 //! Why a stream could not be had, and why a record was not written.
 
-use crate::files::{is_lack_of_descriptors, is_lack_of_memory};
+use crate::memory::files::{is_lack_of_descriptors, is_lack_of_memory};
+use crate::memory::owned::{BadFile, BadSegment};
 use crate::name::Name;
-use crate::node_error::NodeError;
-use crate::owned::{BadFile, BadSegment};
+use crate::node::error::NodeError;
 use crate::stream::shape::{StreamId, StreamShapeError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ pub enum StreamError {
     /// No memory, most likely.
     #[error(
         "stream {id}: {bytes} bytes of shared memory: {source}; is it full (df {})?",
-        crate::files::existing(.node).display()
+        crate::memory::files::existing(.node).display()
     )]
     Memory {
         /// The stream.

@@ -1,8 +1,8 @@
 //! Which streams a node has, and removing those that nobody writes.
 
-use crate::node::{Node, RegistryLock};
-use crate::node_error::{NodeError, REGISTRY_PATIENCE};
-use crate::owned;
+use crate::memory::owned;
+use crate::node::directory::{Node, RegistryLock};
+use crate::node::error::{NodeError, REGISTRY_PATIENCE};
 use crate::step::step;
 use crate::stream::segment::{StreamSegment, file_name, id_of};
 use crate::stream::shape::StreamId;

@@ -2,11 +2,11 @@
 //! seat, changes nothing and asks nobody; so what is seen is a moment, and its parts are of moments that lie a little
 //! apart.
 
-use crate::inspect::Party;
-use crate::lock;
+use crate::figures::inspect::Party;
+use crate::memory::owned::{BadSegment, OWNER_BYTE};
 use crate::name::Name;
-use crate::node::Node;
-use crate::owned::{BadSegment, OWNER_BYTE};
+use crate::node::directory::Node;
+use crate::node::lock;
 use crate::stream::error::StreamError;
 use crate::stream::lookup;
 use crate::stream::missed::Missed;

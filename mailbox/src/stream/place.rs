@@ -1,6 +1,6 @@
 //! A record's bytes as an address, for programs in other languages that hand out views of them.
 
-use crate::memory::Mapping;
+use crate::memory::mapping::Mapping;
 use std::ptr::NonNull;
 
 /// Where a record's bytes are. The memory stays mapped as long as this does, whatever becomes of the reader or the
@@ -57,8 +57,8 @@ impl RecordPlace {
 mod tests {
     use super::RecordPlace;
     use crate::name::Name;
-    use crate::node::Node;
-    use crate::participant::Participant;
+    use crate::node::directory::Node;
+    use crate::node::participant::Participant;
     use crate::stream::ring::Stamp;
     use crate::stream::shape::{StreamId, StreamShape};
     use crate::stream::writer::StreamWriter;

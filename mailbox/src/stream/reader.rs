@@ -2,14 +2,14 @@
 
 mod kept;
 
-use crate::participant::Participant;
+use crate::node::participant::Participant;
 use crate::stream::error::StreamError;
 use crate::stream::lookup::{self, Answer};
 use crate::stream::missed::{Missed, MissedAccount};
 use crate::stream::record::{Around, HeldRecord, Next, RecordInfo, TakenSeat};
 use crate::stream::ring::{Line, Look, Ring, SEQUENCE_MAX, Stamp, TRIES};
 use crate::stream::shape::{StreamId, StreamShape};
-use crate::waiting::{self, Waiting, steps::Steps};
+use crate::wake::waiting::{self, Waiting, steps::Steps};
 use std::sync::Arc;
 
 /// One of a stream's readers, with a position of its own. It may be there before its stream is.

@@ -1,8 +1,8 @@
 //! A reader's seat in a ring, and what is said of records.
 
-use crate::lock::Held;
-use crate::owned::BadSegment;
-use crate::participant::Participant;
+use crate::memory::owned::BadSegment;
+use crate::node::lock::Held;
+use crate::node::participant::Participant;
 use crate::step::step;
 use crate::stream::error::StreamError;
 use crate::stream::place::RecordPlace;

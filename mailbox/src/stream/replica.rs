@@ -11,10 +11,10 @@
 //! own. A ring has one frame to spare, so the second is one that no reader holds at present; if readers hold them all,
 //! the caller gives up the older.
 
-use crate::about;
 use crate::name::Name;
-use crate::node_error::{NodeError, REGISTRY_PATIENCE};
-use crate::participant::Participant;
+use crate::node::about;
+use crate::node::error::{NodeError, REGISTRY_PATIENCE};
+use crate::node::participant::Participant;
 use crate::stream::error::{ReplicaError, StreamError};
 use crate::stream::record::RecordInfo;
 use crate::stream::ring::{LEFT_OUT, SEQUENCE_MAX, Stamp};

@@ -1,10 +1,10 @@
 //! A stream's file, mapped and checked, and the bytes of its records.
 
-use crate::files::Directory;
-use crate::layout::PAGE;
-use crate::memory::{Located, Mapping, Pages, Rooms, Use};
+use crate::memory::files::Directory;
+use crate::memory::layout::PAGE;
+use crate::memory::mapping::{Located, Mapping, Pages, Rooms, Use};
+use crate::memory::owned::{BadFile, BadSegment, Owned};
 use crate::name::Name;
-use crate::owned::{BadFile, BadSegment, Owned};
 use crate::step::step;
 use crate::stream::bytes;
 use crate::stream::place::RecordPlace;

@@ -12,8 +12,8 @@
 //!
 //! docs/src/shared-memory.md has the same for other languages.
 
-use crate::layout::{PAGE, VERSION};
-use crate::memory::Shared;
+use crate::memory::layout::{PAGE, VERSION};
+use crate::memory::mapping::Shared;
 use crate::name::Name;
 use crate::stream::ring::{FRAMES_MAX, IndexEntry, SEQUENCE_MAX, STREAM_READERS_MAX, Seat};
 use std::fmt;

@@ -1,13 +1,13 @@
 //! The writing side of a stream: a record copied in, or filled in place.
 
 use crate::clock::monotonic_ns;
-use crate::doorbell;
-use crate::lock::Held;
+use crate::memory::owned::{self, Refused};
 use crate::name::Name;
-use crate::node::RegistryLock;
-use crate::node_error::{NodeError, REGISTRY_PATIENCE};
-use crate::owned::{self, Refused};
-use crate::participant::Participant;
+use crate::node::directory::RegistryLock;
+use crate::node::error::{NodeError, REGISTRY_PATIENCE};
+use crate::node::lock::Held;
+use crate::node::participant::Participant;
+use crate::slots::word::Claimant;
 use crate::step::step;
 use crate::stream::error::{StreamError, WriteError};
 use crate::stream::omission::LeftOut;
@@ -17,7 +17,7 @@ use crate::stream::ring::{About, Line, Seat, Stamp};
 use crate::stream::segment::StreamSegment;
 use crate::stream::shape::{StreamId, StreamShape};
 use crate::stream::writing::{Frame, Progress};
-use crate::word::Claimant;
+use crate::wake::doorbell;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;

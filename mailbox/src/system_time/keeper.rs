@@ -2,9 +2,9 @@
 
 use super::{BILLION, ERROR_UNKNOWN_NS, FILE, TimePage, TimeRecord, TimeSource, Watched, Written, map};
 use crate::clock::{monotonic_ns, realtime_ns, slept_ns};
-use crate::memory::Mapping;
-use crate::node::Node;
-use crate::node_error::NodeError;
+use crate::memory::mapping::Mapping;
+use crate::node::directory::Node;
+use crate::node::error::NodeError;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 

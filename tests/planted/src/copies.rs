@@ -4,7 +4,8 @@ use crate::Edit;
 use std::fs;
 use std::path::Path;
 
-/// Copies the files of a folder and of those in it, changed; returns their paths within it, in order.
+/// Copies the files of a folder and of those in it, changed, in place of what was copied there before; returns their
+/// paths within it, in order.
 ///
 /// # Errors
 /// What cannot be read, written or changed.
@@ -14,6 +15,8 @@ pub fn copied(
     change: impl Fn(&str, String) -> Result<String, String>,
 ) -> Result<Vec<String>, String> {
     let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
+    // A file that has moved is not left where it was.
+    let _ = fs::remove_dir_all(to);
     let (mut files, mut folders) = (Vec::new(), vec![String::new()]);
     while let Some(inner) = folders.pop() {
         fs::create_dir_all(to.join(&inner)).map_err(failed)?;

@@ -9,7 +9,7 @@ pub(crate) struct Mirrored {
 
 pub(crate) const MIRRORED: &[Mirrored] = &[
     Mirrored {
-        file: "waiting",
+        file: "wake/waiting",
         what: "models::Receiver::wait does the same, change both",
         lines: &[
             "fn settled<",
@@ -22,7 +22,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         ],
     },
     Mirrored {
-        file: "watch",
+        file: "wake/watch",
         what: "models::Receiver::wait does the same, change both",
         // The real one also looks at the bell by itself now and then; here the pipe alone must do.
         lines: &[
@@ -50,7 +50,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         lines: &["fn search(", "slots.reclaim(", "self.queue.rescan(&slots);", "self.queue.doubt();"],
     },
     Mirrored {
-        file: "registry",
+        file: "node/registry",
         what: "models::a_retired_mailbox_keeps_nothing does the same, change both",
         lines: &[
             "fn retire(old: &Segment)",
@@ -76,7 +76,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         ],
     },
     Mirrored {
-        file: "slots",
+        file: "slots/protocol",
         what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it \
             weakened",
         lines: &[
@@ -89,7 +89,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         ],
     },
     Mirrored {
-        file: "hot",
+        file: "slots/hot",
         what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it \
             weakened",
         lines: &[
@@ -100,7 +100,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         ],
     },
     Mirrored {
-        file: "queue",
+        file: "slots/queue",
         what: "SeqCst stands for the fence that the models have before it (seq_cst_accesses), and no model would see \
             it weakened",
         lines: &["hints.load(Ordering::SeqCst)"],
@@ -118,7 +118,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         lines: &["seat.hold.load(Ordering::SeqCst)", "seq_cst_accesses();", "seat.sleeper.load(Ordering::SeqCst)"],
     },
     Mirrored {
-        file: "doorbell",
+        file: "wake/doorbell",
         what: "models::Mailbox::ring does the same, change both",
         lines: &["fn ring(", "let polling = bell.ring();", "FUTEX_WAKE", "if polling {", "write_to_pipe("],
     },

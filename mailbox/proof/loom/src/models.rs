@@ -1,11 +1,11 @@
 //! The models: small programs that loom runs in every order of their threads' steps, with the real and each broken
 //! core.
 
-use crate::full::OverflowPolicy;
 use crate::name::Priority;
-use crate::queue::Queue;
 use crate::rig::{Mailbox, Receiver, Sender, Sent, of_first, sorted};
-use crate::slots::Published;
+use crate::slots::full::OverflowPolicy;
+use crate::slots::protocol::Published;
+use crate::slots::queue::Queue;
 use crate::step::{dies_at, reached};
 use crate::sync::Ordering;
 use loom::thread;

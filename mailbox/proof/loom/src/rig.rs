@@ -4,15 +4,15 @@
 //! written here again, small; `build.rs` fails when the lines that matter are no longer there in this order.
 
 use crate::name::Priority;
-use crate::bell::Bell;
-use crate::bodies::Bodies;
-use crate::full::{OverflowPolicy, NoSlot};
-use crate::queue::Queue;
-use crate::hot::Hot;
-use crate::slots::{Posted, Published, Slots};
+use crate::wake::bell::Bell;
+use crate::slots::bodies::Bodies;
+use crate::slots::full::{OverflowPolicy, NoSlot};
+use crate::slots::queue::Queue;
+use crate::slots::hot::Hot;
+use crate::slots::protocol::{Posted, Published, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
-use crate::word::{Claimant, FREE, Victim, Word};
+use crate::slots::word::{Claimant, FREE, Victim, Word};
 use loom::cell::UnsafeCell;
 use loom::thread::{self, JoinHandle};
 use std::sync::{Arc, Mutex};

@@ -80,8 +80,8 @@ impl StreamReader {
 #[cfg(test)]
 mod tests {
     use crate::name::Name;
-    use crate::node::Node;
-    use crate::participant::Participant;
+    use crate::node::directory::Node;
+    use crate::node::participant::Participant;
     use crate::stream::record::Next;
     use crate::stream::ring::Stamp;
     use crate::stream::shape::{StreamId, StreamShape};

@@ -1,7 +1,7 @@
 //! Records of another node: in order, whole, several at a time, and what is not there is told.
 
 use super::*;
-use crate::node::{Node, RegistryLock};
+use crate::node::directory::{Node, RegistryLock};
 use crate::stream::error::WriteError;
 use crate::stream::missed::Missed;
 use crate::stream::reader::StreamReader;

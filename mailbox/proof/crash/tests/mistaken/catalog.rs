@@ -19,7 +19,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "what_the_dead_filled_is_published",
         edits: &[edit(
-            "slots.rs",
+            "slots/protocol.rs",
             "freed += usize::from(self.change(slot, word, FREE));",
             "let left = if broken!(what_the_dead_filled_is_published) { Word::ready(Priority(0), 0) } else { FREE };
                 freed += usize::from(self.change(slot, word, left));",
@@ -30,14 +30,14 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     // The slot is lost for ever.
     Mistake {
         name: "claims_of_the_dead_stay",
-        edits: &[edit("slots.rs", "if dead(by) {", "if !broken!(claims_of_the_dead_stay) && dead(by) {")],
+        edits: &[edit("slots/protocol.rs", "if dead(by) {", "if !broken!(claims_of_the_dead_stay) && dead(by) {")],
         scene: SENDING,
         says: "check Usable",
     },
     Mistake {
         name: "the_dead_forget_what_they_displaced",
         edits: &[edit(
-            "slots.rs",
+            "slots/protocol.rs",
             "victim.into_iter().for_each(&mut lost);",
             "victim.filter(|_| !broken!(the_dead_forget_what_they_displaced)).into_iter().for_each(&mut lost);",
         )],
@@ -47,14 +47,14 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     // Sent, and its sender died before it could hint.
     Mistake {
         name: "a_search_looks_at_hints_alone",
-        edits: &[left_out("queue.rs", "(0..slots.count()).for_each(|slot| self.defer(slot));")],
+        edits: &[left_out("slots/queue.rs", "(0..slots.count()).for_each(|slot| self.defer(slot));")],
         scene: SENDING,
         says: "check Drained",
     },
     Mistake {
         name: "what_was_in_dead_hands_stays_there",
         edits: &[edit(
-            "slots.rs",
+            "slots/protocol.rs",
             "if word.state() != State::Taken {",
             "if broken!(what_was_in_dead_hands_stays_there) || word.state() != State::Taken {",
         )],
@@ -65,7 +65,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "what_was_in_dead_hands_is_not_marked",
         edits: &[edit(
-            "slots.rs",
+            "slots/protocol.rs",
             "self.change(slot, word, word.redelivered());",
             "let again = if broken!(what_was_in_dead_hands_is_not_marked) {
                     Word::ready(word.priority(), word.ticket())
@@ -79,13 +79,13 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     },
     Mistake {
         name: "poison_is_dropped_uncounted",
-        edits: &[left_out("slots.rs", "poison(word.priority());")],
+        edits: &[left_out("slots/protocol.rs", "poison(word.priority());")],
         scene: "receiving::a_receiver_dies_adopting_what_killed_the_last_two",
         says: "0 counted as poison",
     },
     Mistake {
         name: "a_death_rings_nobody",
-        edits: &[left_out("node.rs", "doorbell::ring_all(self);")],
+        edits: &[left_out("node/directory.rs", "doorbell::ring_all(self);")],
         scene: "sending::a_sender_dies_beside_a_sleeping_receiver",
         says: "left: None",
     },
@@ -104,7 +104,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "what_is_given_up_is_uncounted",
         edits: &[edit(
-            "registry.rs",
+            "node/registry.rs",
             "old.page().counters.lost(taken.word().priority(), Loss::Closed, 1);",
             "let counted = u64::from(!broken!(what_is_given_up_is_uncounted));
         old.page().counters.lost(taken.word().priority(), Loss::Closed, counted);",
@@ -116,7 +116,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "equals_are_displaced",
         edits: &[edit(
-            "slots.rs",
+            "slots/protocol.rs",
             "priority.outranks(word.priority())",
             "(priority.outranks(word.priority()) || broken!(equals_are_displaced) && priority == word.priority())",
         )],
@@ -126,7 +126,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "the_last_slot_is_overlooked",
         edits: &[edit(
-            "queue.rs",
+            "slots/queue.rs",
             "if slot >= slots.count() {",
             "if slot >= slots.count() - usize::from(broken!(the_last_slot_is_overlooked)) {",
         )],
@@ -136,7 +136,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "the_last_goes_first",
         edits: &[edit(
-            "slots.rs",
+            "slots/protocol.rs",
             "if claim.place == FREE { ticket }",
             "if broken!(the_last_goes_first) { !ticket } else if claim.place == FREE { ticket }",
         )],
@@ -145,7 +145,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     },
     Mistake {
         name: "nothing_is_released",
-        edits: &[left_out("slots.rs", "self.change(taken.slot, taken.word, FREE);")],
+        edits: &[left_out("slots/protocol.rs", "self.change(taken.slot, taken.word, FREE);")],
         scene: SENDING,
         says: "check UsableAgain",
     },
@@ -165,11 +165,11 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "the_table_is_believed",
         edits: &[
             edit(
-                "node.rs",
+                "node/directory.rs",
                 "let alive = |index: &u16| lock::is_locked(",
                 "let alive = |index: &u16| broken!(the_table_is_believed) || lock::is_locked(",
             ),
-            left_out("participant.rs", "entry.pid.store(0, Ordering::Release);"),
+            left_out("node/participant.rs", "entry.pid.store(0, Ordering::Release);"),
         ],
         scene: SENDING,
         says: "check Nobody",
@@ -177,7 +177,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     Mistake {
         name: "places_stay_locked",
         edits: &[edit(
-            "participant.rs",
+            "node/participant.rs",
             "        self.leave();\n",
             "        self.leave();
         if broken!(places_stay_locked) {
@@ -189,7 +189,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
     },
     Mistake {
         name: "the_directory_stays",
-        edits: &[left_out("registry.rs", "self.directory().remove_all().map_err(failed)?;")],
+        edits: &[left_out("node/registry.rs", "self.directory().remove_all().map_err(failed)?;")],
         scene: SENDING,
         says: "check Gone",
     },

@@ -55,7 +55,7 @@ fn without_a_mistake_all_scenes_pass_and_die_at_every_step() {
 fn a_step_that_no_scene_dies_at_is_named() {
     let source = "fn claim() {\n    step!(\"claim: before\");\n    step!(\"claim: new\");\n}\n";
     let died = BTreeSet::from(["claim: before"]);
-    assert_eq!(survived("slots.rs", source, &died), ["mailbox/src/slots.rs:3: claim: new"]);
+    assert_eq!(survived("slots/protocol.rs", source, &died), ["mailbox/src/slots/protocol.rs:3: claim: new"]);
 }
 
 #[test]

@@ -5,11 +5,16 @@ use super::variant::{Broken, FENCE_E, NO_FENCE_E, WRONG, broken, edit};
 pub(crate) const BROKEN: &[Broken] = &[
     // ---- giving up ----
     // Neither sees the other: an accepted package stays in a mailbox that nobody receives from.
-    broken("no_fence_e_at_retirement", &[edit("slots", FENCE_E, NO_FENCE_E)], "a_retired_mailbox_keeps_nothing", WRONG),
+    broken(
+        "no_fence_e_at_retirement",
+        &[edit("slots/protocol", FENCE_E, NO_FENCE_E)],
+        "a_retired_mailbox_keeps_nothing",
+        WRONG,
+    ),
     broken(
         "no_fence_g",
         &[edit(
-            "hot",
+            "slots/hot",
             "last look at the words. Pairs with (E).\n        fence(Ordering::SeqCst);\n",
             "last look at the words. Pairs with (E).\n",
         )],
@@ -39,21 +44,25 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Whatever is neither free nor a package was in dead hands, it seems; a sender is filling it.
     broken(
         "adopts_what_is_being_filled",
-        &[edit("slots", "if word.state() != State::Taken {", "if word == FREE || word.is_ready() {")],
+        &[edit("slots/protocol", "if word.state() != State::Taken {", "if word == FREE || word.is_ready() {")],
         "a_retired_mailbox_keeps_nothing_of_the_dead",
         WRONG,
     ),
     // What a sender displaced, and has not counted yet when the counters are carried over.
     broken(
         "settles_nothing",
-        &[edit("slots", "lost(victim);\n                step!(\"settle: counted\");", "step!(\"settle: counted\");")],
+        &[edit(
+            "slots/protocol",
+            "lost(victim);\n                step!(\"settle: counted\");",
+            "step!(\"settle: counted\");",
+        )],
         "a_replaced_mailbox_hides_no_loss",
         "hidden",
     ),
     // Displaced after the owner's last look, and counted where nobody looks any more.
     broken(
         "forgets_late_victims",
-        &[edit("slots", "self.victim().filter(|_| self.late)", "None")],
+        &[edit("slots/protocol", "self.victim().filter(|_| self.late)", "None")],
         "a_replaced_mailbox_hides_no_late_loss",
         "hidden",
     ),
@@ -61,7 +70,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "retirement_seen_only_at_claim",
         &[edit(
-            "slots",
+            "slots/protocol",
             "if receiver.retired.load(Ordering::SeqCst) != 0 && self.change(slot, word, claim.word) {",
             "if false {",
         )],
@@ -72,7 +81,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "taken_back_without_compare",
         &[edit(
-            "slots",
+            "slots/protocol",
             "if receiver.retired.load(Ordering::SeqCst) != 0 && self.change(slot, word, claim.word) {",
             "if receiver.retired.load(Ordering::SeqCst) != 0 && { self.word(slot).swap(claim.word.0, \
              Ordering::AcqRel); true } {",
@@ -84,42 +93,42 @@ pub(crate) const BROKEN: &[Broken] = &[
     // The slot is given to another while its filler still writes.
     broken(
         "reclaims_the_living",
-        &[edit("slots", "if dead(by) {", "if dead(by) || true {")],
+        &[edit("slots/protocol", "if dead(by) {", "if dead(by) || true {")],
         "a_sender_dies_with_a_claim",
         WRONG,
     ),
     // A slot less with every death.
     broken(
         "reclaims_nothing",
-        &[edit("slots", "freed += usize::from(self.change(slot, word, FREE));", "freed += 0;")],
+        &[edit("slots/protocol", "freed += usize::from(self.change(slot, word, FREE));", "freed += 0;")],
         "a_sender_dies_with_a_ticket",
         WRONG,
     ),
     // What replaces has its package elsewhere, but its claim is in this slot.
     broken(
         "reclaim_leaves_what_replaces",
-        &[edit("slots", "if dead(by) {", "if dead(by) && !victim.is_some_and(|victim| victim.replaced) {")],
+        &[edit("slots/protocol", "if dead(by) {", "if dead(by) && !victim.is_some_and(|victim| victim.replaced) {")],
         "a_replacer_dies_before_the_old_one_goes",
         WRONG,
     ),
     // An accepted package is gone, and no counter knows.
     broken(
         "reclaim_forgets_the_displaced",
-        &[edit("slots", "victim.into_iter().for_each(&mut lost);", "let _ = (victim, &mut lost);")],
+        &[edit("slots/protocol", "victim.into_iter().for_each(&mut lost);", "let _ = (victim, &mut lost);")],
         "a_displacer_dies",
         WRONG,
     ),
     // A sender that died between word and hint has told nobody.
     broken(
         "rescan_looks_nowhere",
-        &[edit("queue", "(0..slots.count()).for_each(|slot| self.defer(slot));", "let _ = slots;")],
+        &[edit("slots/queue", "(0..slots.count()).for_each(|slot| self.defer(slot));", "let _ = slots;")],
         "a_sender_dies_without_its_hint",
         WRONG,
     ),
     // The same, when no death was noticed.
     broken(
         "no_look_in_turn",
-        &[edit("queue", "if self.receives.is_multiple_of(RESCAN_EVERY) {", "if false {")],
+        &[edit("slots/queue", "if self.receives.is_multiple_of(RESCAN_EVERY) {", "if false {")],
         "a_package_without_hint_is_found_in_turn",
         WRONG,
     ),
@@ -127,7 +136,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "adoption_leaves_taken",
         &[edit(
-            "slots",
+            "slots/protocol",
             "            if word.state() != State::Taken {\n                continue;",
             "            if true {\n                continue;",
         )],
@@ -137,7 +146,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // A package that kills its receiver kills each of its successors.
     broken(
         "redelivery_unmarked",
-        &[edit("word", "READY << STATE | REDELIVERED)", "READY << STATE)")],
+        &[edit("slots/word", "READY << STATE | REDELIVERED)", "READY << STATE)")],
         "a_package_in_dead_hands_is_delivered_once_more",
         WRONG,
     ),

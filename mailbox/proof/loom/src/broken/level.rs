@@ -9,7 +9,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // ---- the level, and the alert above it ----
     broken(
         "nobody_alerts",
-        &[edit("slots", "self.hot.alert.0.swap(1, Ordering::Release);", "")],
+        &[edit("slots/protocol", "self.hot.alert.0.swap(1, Ordering::Release);", "")],
         "the_urgent_passes_what_is_known",
         WRONG,
     ),
@@ -18,18 +18,18 @@ pub(crate) const BROKEN: &[Broken] = &[
         "alert_without_release",
         &[
             edit(
-                "slots",
+                "slots/protocol",
                 "self.hot.alert.0.swap(1, Ordering::Release);",
                 "self.hot.alert.0.swap(1, Ordering::Relaxed);",
             ),
-            edit("slots", FENCE_E, NO_FENCE_E),
+            edit("slots/protocol", FENCE_E, NO_FENCE_E),
         ],
         "the_urgent_passes_what_is_known",
         WRONG,
     ),
     broken(
         "heed_without_acquire",
-        &[edit("hot", "alert.0.swap(0, Ordering::AcqRel)", "alert.0.swap(0, Ordering::Release)")],
+        &[edit("slots/hot", "alert.0.swap(0, Ordering::AcqRel)", "alert.0.swap(0, Ordering::Release)")],
         "the_urgent_passes_what_is_known",
         WRONG,
     ),
@@ -37,7 +37,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "heeds_after_the_look",
         &[edit(
-            "queue",
+            "slots/queue",
             "        if slots.is_alerted() {\n            slots.heed();\n        }\n        self.look(slots);\n",
             "        self.look(slots);\n        if slots.is_alerted() {\n            slots.heed();\n        }\n",
         )],
@@ -47,14 +47,18 @@ pub(crate) const BROKEN: &[Broken] = &[
     // A sender that read the higher level did not alert, and is overlooked.
     broken(
         "no_look_at_the_new_level",
-        &[edit("queue", LOWER, "            slots.lower_level(first);\n            self.level = first.0.into();\n")],
+        &[edit(
+            "slots/queue",
+            LOWER,
+            "            slots.lower_level(first);\n            self.level = first.0.into();\n",
+        )],
         "what_comes_as_the_level_sinks_is_next",
         WRONG,
     ),
     broken(
         "the_new_level_is_said_after_the_look",
         &[edit(
-            "queue",
+            "slots/queue",
             LOWER,
             "            self.look(slots);\n            slots.lower_level(first);\n            self.level = \
              first.0.into();\n",
@@ -65,13 +69,13 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Neither sees the other: the sender reads the old level, the receiver the old hints.
     broken(
         "no_fence_j",
-        &[edit("hot", "did not alert.\n        seq_cst_accesses();\n", "did not alert.\n")],
+        &[edit("slots/hot", "did not alert.\n        seq_cst_accesses();\n", "did not alert.\n")],
         "what_comes_as_the_level_sinks_is_next",
         WRONG,
     ),
     broken(
         "no_fence_e_at_the_level",
-        &[edit("slots", FENCE_E, NO_FENCE_E)],
+        &[edit("slots/protocol", FENCE_E, NO_FENCE_E)],
         "what_comes_as_the_level_sinks_is_next",
         WRONG,
     ),
@@ -79,8 +83,8 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "a_successor_trusts_the_level",
         &[
-            edit("queue", "receives: 0, level: NO_LEVEL }", "receives: 0, level: 0 }"),
-            edit("queue", "        self.level = NO_LEVEL;\n    }", "    }"),
+            edit("slots/queue", "receives: 0, level: NO_LEVEL }", "receives: 0, level: 0 }"),
+            edit("slots/queue", "        self.level = NO_LEVEL;\n    }", "    }"),
         ],
         "a_new_owner_says_its_own_level",
         WRONG,
@@ -90,7 +94,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "alerts_by_a_store",
         &[edit(
-            "slots",
+            "slots/protocol",
             "self.hot.alert.0.swap(1, Ordering::Release);",
             "self.hot.alert.0.store(1, Ordering::Release);",
         )],
@@ -101,7 +105,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "alerts_unless_alerted",
         &[edit(
-            "slots",
+            "slots/protocol",
             "self.hot.alert.0.swap(1, Ordering::Release);",
             "if self.hot.alert.0.load(Ordering::Relaxed) == 0 { self.hot.alert.0.swap(1, Ordering::Release); }",
         )],
@@ -111,28 +115,36 @@ pub(crate) const BROKEN: &[Broken] = &[
     // A state raised to the level, and older than what is known of the level.
     broken(
         "what_moved_alerts_nobody",
-        &[edit("slots", "u32::from(priority.0) + u32::from(moved) > receiver", "u32::from(priority.0) > receiver")],
+        &[edit(
+            "slots/protocol",
+            "u32::from(priority.0) + u32::from(moved) > receiver",
+            "u32::from(priority.0) > receiver",
+        )],
         "a_state_raised_to_the_level_is_found",
         WRONG,
     ),
     // It has hinted, and nobody looks.
     broken(
         "a_death_raises_no_doubt",
-        &[edit("queue", "        self.level = NO_LEVEL;\n    }", "    }")],
+        &[edit("slots/queue", "        self.level = NO_LEVEL;\n    }", "    }")],
         "a_sender_that_dies_before_its_alert_is_heard",
         WRONG,
     ),
     // The state's newer package waits until all that was known has been received.
     broken(
         "no_look_after_a_miss",
-        &[edit("queue", "            known = false;\n", "")],
+        &[edit("slots/queue", "            known = false;\n", "")],
         "the_newest_is_found_in_its_place",
         WRONG,
     ),
     // The rank without the priority.
     broken(
         "first_come_first_served",
-        &[edit("word", "(self.priority().0 as u64) << RANK | (TICKET - self.ticket())", "TICKET - self.ticket()")],
+        &[edit(
+            "slots/word",
+            "(self.priority().0 as u64) << RANK | (TICKET - self.ticket())",
+            "TICKET - self.ticket()",
+        )],
         "the_more_important_goes_first",
         WRONG,
     ),

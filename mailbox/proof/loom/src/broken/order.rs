@@ -4,12 +4,13 @@ use super::variant::{Broken, Edit, FENCE_E, NO_FENCE_E, RACE, WRONG, broken, edi
 
 /// Every look is one with a horizon, as after a first one that senders were quicker than.
 const ONLY_WITH_HORIZON: Edit = edit(
-    "queue",
+    "slots/queue",
     "        self.collect(slots, u64::MAX);\n        // ORDERING: the words",
     "        // ORDERING: the words",
 );
 
-const WITHOUT_RETURN: Edit = edit("queue", "        if !slots.any_hint() {\n            return;\n        }\n", "");
+const WITHOUT_RETURN: Edit =
+    edit("slots/queue", "        if !slots.any_hint() {\n            return;\n        }\n", "");
 
 pub(crate) const BROKEN: &[Broken] = &[
     // ---- the word hands the body over: (A) to (D) ----
@@ -17,7 +18,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "publish_without_release",
         &[edit(
-            "slots",
+            "slots/protocol",
             "if !self.change(slot, claim.word, word) {",
             "if self.word(slot).compare_exchange(claim.word.0, word.0, Ordering::Acquire, Ordering::Relaxed).is_err() \
              {",
@@ -32,20 +33,20 @@ pub(crate) const BROKEN: &[Broken] = &[
         "receiver_without_acquire",
         &[
             edit(
-                "slots",
+                "slots/protocol",
                 "self.change(slot, seen, word).then_some",
                 "self.word(slot).compare_exchange(seen.0, word.0, Ordering::Release, \
                  Ordering::Relaxed).is_ok().then_some",
             ),
             edit(
-                "slots",
+                "slots/protocol",
                 "Word(self.word(slot).load(Ordering::Acquire))",
                 "Word(self.word(slot).load(Ordering::Relaxed))",
             ),
-            edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
-            edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)"),
-            edit("queue", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
-            edit("hot", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
+            edit("slots/queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
+            edit("slots/queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)"),
+            edit("slots/queue", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
+            edit("slots/hot", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
         ],
         "a_body_is_handed_over_whole",
         WRONG,
@@ -54,7 +55,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "release_without_release",
         &[edit(
-            "slots",
+            "slots/protocol",
             "        self.change(taken.slot, taken.word, FREE);\n",
             "        let _ = self.word(taken.slot).compare_exchange(taken.word.0, FREE.0, Ordering::Acquire, \
              Ordering::Relaxed);\n",
@@ -66,7 +67,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "claim_without_acquire",
         &[edit(
-            "slots",
+            "slots/protocol",
             "&& self.change(slot, FREE, word) {",
             "&& self.word(slot).compare_exchange(FREE.0, word.0, Ordering::Release, Ordering::Relaxed).is_ok() {",
         )],
@@ -77,7 +78,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "claim_without_compare",
         &[edit(
-            "slots",
+            "slots/protocol",
             "&& self.change(slot, FREE, word) {",
             "&& { self.word(slot).swap(word.0, Ordering::AcqRel); true } {",
         )],
@@ -89,9 +90,9 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "hint_before_word",
         &[
-            edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
+            edit("slots/protocol", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
             edit(
-                "slots",
+                "slots/protocol",
                 "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { \
                  claim.place.ticket() });\n",
                 "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { \
@@ -105,14 +106,18 @@ pub(crate) const BROKEN: &[Broken] = &[
     // The same, by reordering: the hint is seen before the word it speaks of.
     broken(
         "hint_without_release",
-        &[edit("hot", "fetch_or(1 << (slot % 64), Ordering::SeqCst)", "fetch_or(1 << (slot % 64), Ordering::Relaxed)")],
+        &[edit(
+            "slots/hot",
+            "fetch_or(1 << (slot % 64), Ordering::SeqCst)",
+            "fetch_or(1 << (slot % 64), Ordering::Relaxed)",
+        )],
         "everything_arrives_once_and_in_order",
         WRONG,
     ),
     // And from the receiver's side.
     broken(
         "hint_without_acquire",
-        &[edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)")],
+        &[edit("slots/queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)")],
         "everything_arrives_once_and_in_order",
         WRONG,
     ),
@@ -120,9 +125,9 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "hints_cleared_after_the_look",
         &[
-            edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.load(Ordering::Acquire)"),
+            edit("slots/queue", "hints.swap(0, Ordering::AcqRel)", "hints.load(Ordering::Acquire)"),
             edit(
-                "queue",
+                "slots/queue",
                 "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            }\n",
                 "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            \
                  }\n            if fresh != 0 { hints.swap(0, Ordering::AcqRel); }\n",
@@ -138,7 +143,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         &[
             ONLY_WITH_HORIZON,
             WITHOUT_RETURN,
-            edit("queue", "if word.ticket() < horizon {", "if word.ticket() < u64::MAX {"),
+            edit("slots/queue", "if word.ticket() < horizon {", "if word.ticket() < u64::MAX {"),
         ],
         "a_second_package_never_passes_the_first",
         WRONG,
@@ -149,7 +154,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         &[
             ONLY_WITH_HORIZON,
             WITHOUT_RETURN,
-            edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
+            edit("slots/queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
         ],
         "a_second_package_never_passes_the_first",
         WRONG,
@@ -160,8 +165,12 @@ pub(crate) const BROKEN: &[Broken] = &[
         &[
             ONLY_WITH_HORIZON,
             WITHOUT_RETURN,
-            edit("slots", "ticket.0.fetch_add(1, Ordering::AcqRel)", "ticket.0.fetch_add(1, Ordering::Acquire)"),
-            edit("slots", FENCE_E, NO_FENCE_E),
+            edit(
+                "slots/protocol",
+                "ticket.0.fetch_add(1, Ordering::AcqRel)",
+                "ticket.0.fetch_add(1, Ordering::Acquire)",
+            ),
+            edit("slots/protocol", FENCE_E, NO_FENCE_E),
         ],
         "a_second_package_never_passes_the_first",
         WRONG,
@@ -169,7 +178,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // A deferred slot must be looked at again though its hint is gone.
     broken(
         "too_young_is_forgotten",
-        &[ONLY_WITH_HORIZON, WITHOUT_RETURN, edit("queue", "else { self.defer(slot) }", "else { }")],
+        &[ONLY_WITH_HORIZON, WITHOUT_RETURN, edit("slots/queue", "else { self.defer(slot) }", "else { }")],
         "everything_arrives_once_and_in_order",
         WRONG,
     ),
@@ -178,29 +187,29 @@ pub(crate) const BROKEN: &[Broken] = &[
         "ticket_at_claim",
         &[
             edit(
-                "slots",
+                "slots/protocol",
                 "    segment: u64,\n    word: Word,\n    /// The package that",
                 "    segment: u64,\n    word: Word,\n    ticket: u64,\n    /// The package that",
             ),
             edit(
-                "slots",
+                "slots/protocol",
                 "return Ok(Claim { slot, segment: self.bodies.segment, word, place: FREE, late: false });",
                 "return Ok(Claim { slot, segment: self.bodies.segment, word, place: FREE, late: false, ticket: \
                  self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
-                "slots",
+                "slots/protocol",
                 "return Some(Claim { slot, segment: self.bodies.segment, word, place: FREE, late });",
                 "return Some(Claim { slot, segment: self.bodies.segment, word, place: FREE, late, ticket: \
                  self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
-                "slots",
+                "slots/protocol",
                 "slot: old.slot, segment, word, place: old.word, late: false })",
                 "slot: old.slot, segment, word, place: old.word, late: false, ticket: 0 })",
             ),
             edit(
-                "slots",
+                "slots/protocol",
                 "let ticket = self.hot.ticket.0.fetch_add(1, Ordering::AcqRel);",
                 "let ticket = claim.ticket;",
             ),
@@ -211,7 +220,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // The first look meets the second package of a sender; the first came behind it, and no other look follows.
     broken(
         "no_look_for_more",
-        &[edit("queue", "if !slots.any_hint() {", "if true {")],
+        &[edit("slots/queue", "if !slots.any_hint() {", "if true {")],
         "a_second_package_never_passes_the_first",
         WRONG,
     ),

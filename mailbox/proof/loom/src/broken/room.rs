@@ -3,7 +3,7 @@
 use super::variant::{Broken, Edit, RACE, WRONG, broken, edit};
 
 const IN_PLACE_WITHOUT_RELEASE: Edit = edit(
-    "slots",
+    "slots/protocol",
     "if !self.change(slot, claim.word, word) {",
     "let success = if claim.place != FREE { Ordering::Relaxed } else { Ordering::SeqCst };\n        if \
      self.word(slot).compare_exchange(claim.word.0, word.0, success, Ordering::Relaxed).is_err() {",
@@ -15,7 +15,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "displace_without_compare",
         &[edit(
-            "slots",
+            "slots/protocol",
             "if self.change(slot, last, word) {",
             "if { self.word(slot).swap(word.0, Ordering::AcqRel); true } {",
         )],
@@ -26,7 +26,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "take_without_compare",
         &[edit(
-            "slots",
+            "slots/protocol",
             "self.change(slot, seen, word).then_some",
             "{ self.word(slot).swap(word.0, Ordering::AcqRel); true }.then_some",
         )],
@@ -37,7 +37,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "a_changed_slot_keeps_its_rank",
         &[edit(
-            "queue",
+            "slots/queue",
             "self.heap[at as usize].0 = word;\n                at as usize",
             "self.heap[at as usize].0 = word;\n                return",
         )],
@@ -47,14 +47,18 @@ pub(crate) const BROKEN: &[Broken] = &[
     // The receiver takes the last package that could be displaced, and the mailbox is empty: still it is called full.
     broken(
         "displace_overlooks_freed_slots",
-        &[edit("slots", "*word == FREE || word.is_ready()", "word.is_ready()")],
+        &[edit("slots/protocol", "*word == FREE || word.is_ready()", "word.is_ready()")],
         "a_sender_that_outranks_all_is_not_refused",
         WRONG,
     ),
     // The loss shows nowhere.
     broken(
         "displaced_not_counted",
-        &[edit("slots", "(last != FREE).then(|| Victim { priority: last.priority(), replaced: false })", "None")],
+        &[edit(
+            "slots/protocol",
+            "(last != FREE).then(|| Victim { priority: last.priority(), replaced: false })",
+            "None",
+        )],
         "two_displace_two",
         WRONG,
     ),
@@ -63,7 +67,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "replace_without_compare",
         &[edit(
-            "slots",
+            "slots/protocol",
             "if self.change(old.slot, old.word, FREE) {",
             "if { self.word(old.slot).swap(FREE.0, Ordering::AcqRel); true } {",
         )],
@@ -74,7 +78,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "reuse_without_compare",
         &[edit(
-            "slots",
+            "slots/protocol",
             "let reused = self.change(old.slot, old.word, word);",
             "let reused = { self.word(old.slot).swap(word.0, Ordering::AcqRel); true };",
         )],
@@ -85,7 +89,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "counted_though_it_was_received",
         &[edit(
-            "slots",
+            "slots/protocol",
             "self.change(claim.slot, marked, claim.word);",
             "if true { claim.word = marked; return true; }",
         )],
@@ -96,7 +100,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "nothing_is_replaced",
         &[edit(
-            "slots",
+            "slots/protocol",
             "        let State::Filling { by, .. } = claim.word.state() else { return false };",
             "        let State::Filling { by, .. } = claim.word.state() else { return false };\n        if true { \
              return false; }",
@@ -114,7 +118,7 @@ pub(crate) const BROKEN: &[Broken] = &[
                 "if self.last.is_some_and(|old| slots.replace(&mut claim, old)) {",
                 "let late = self.last;\n        if false {",
             ),
-            edit("slots", "{ ticket } else { claim.place.ticket() }", "{ 0 } else { claim.place.ticket() }"),
+            edit("slots/protocol", "{ ticket } else { claim.place.ticket() }", "{ 0 } else { claim.place.ticket() }"),
             edit(
                 "rig",
                 "                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);",
@@ -131,7 +135,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Always last in the queue: with others that send as fast as the receiver receives, it is never received.
     broken(
         "the_newest_goes_to_the_end",
-        &[edit("slots", "if claim.place == FREE { ticket } else { claim.place.ticket() }", "ticket")],
+        &[edit("slots/protocol", "if claim.place == FREE { ticket } else { claim.place.ticket() }", "ticket")],
         "the_newest_keeps_its_place",
         WRONG,
     ),
@@ -143,7 +147,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         &[
             IN_PLACE_WITHOUT_RELEASE,
             edit(
-                "slots",
+                "slots/protocol",
                 "if !self.change(claim.slot, claim.word, marked) {",
                 "if self.word(claim.slot).compare_exchange(claim.word.0, marked.0, Ordering::Relaxed, \
                  Ordering::Relaxed).is_err() {",
@@ -156,7 +160,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "replaces_unmarked",
         &[edit(
-            "slots",
+            "slots/protocol",
             "let marked = Word::filling(by, Some(old.as_victim()));",
             "let marked = Word::filling(by, None);",
         )],
@@ -165,7 +169,11 @@ pub(crate) const BROKEN: &[Broken] = &[
     ),
     broken(
         "reuses_unmarked",
-        &[edit("slots", "let word = Word::filling(by, Some(old.as_victim()));", "let word = Word::filling(by, None);")],
+        &[edit(
+            "slots/protocol",
+            "let word = Word::filling(by, Some(old.as_victim()));",
+            "let word = Word::filling(by, None);",
+        )],
         "a_replacer_dies_in_the_only_slot",
         "hidden",
     ),
@@ -173,7 +181,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "settles_no_replaced",
         &[edit(
-            "slots",
+            "slots/protocol",
             "lost(victim);\n                step!(\"settle: counted\");",
             "if !victim.replaced { lost(victim); }\n                step!(\"settle: counted\");",
         )],

@@ -7,11 +7,11 @@ const DROWSY: &str = "        receivers.iter().for_each(|receiver| receiver.mail
 pub(crate) const BROKEN: &[Broken] = &[
     // ---- sleeping ----
     // Neither sees the other: the sender reads the old `sleeping`, the receiver the old hints.
-    broken("no_fence_e", &[edit("slots", FENCE_E, NO_FENCE_E)], "no_wake_up_is_lost", ENDLESS),
+    broken("no_fence_e", &[edit("slots/protocol", FENCE_E, NO_FENCE_E)], "no_wake_up_is_lost", ENDLESS),
     broken(
         "no_fence_f",
         &[edit(
-            "hot",
+            "slots/hot",
             "Pairs with (E).\n        seq_cst_accesses();\n    }\n\n    /// Says that the receiver does not sleep.",
             "Pairs with (E).\n    }\n\n    /// Says that the receiver does not sleep.",
         )],
@@ -58,7 +58,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // That of the displaced package has woken the receiver already, which then finds a slot that is being filled.
     broken(
         "a_displacer_rings_nobody",
-        &[edit("slots", "let wake = rings(", "let wake = claim.victim().is_none() && rings(")],
+        &[edit("slots/protocol", "let wake = rings(", "let wake = claim.victim().is_none() && rings(")],
         "no_wake_up_is_lost_when_displaced",
         ENDLESS,
     ),
@@ -79,13 +79,13 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Neither sees the other: the ringer reads the old `polling`, the sleeper the old rings.
     broken(
         "no_fence_h",
-        &[edit("bell", "Pairs with (I).\n        fence(Ordering::SeqCst);\n", "Pairs with (I).\n")],
+        &[edit("wake/bell", "Pairs with (I).\n        fence(Ordering::SeqCst);\n", "Pairs with (I).\n")],
         "no_wake_up_is_lost_in_poll",
         ENDLESS,
     ),
     broken(
         "no_fence_i",
-        &[edit("bell", "Pairs with (H).\n        fence(Ordering::SeqCst);\n", "Pairs with (H).\n")],
+        &[edit("wake/bell", "Pairs with (H).\n        fence(Ordering::SeqCst);\n", "Pairs with (H).\n")],
         "no_wake_up_is_lost_in_poll",
         ENDLESS,
     ),
@@ -94,12 +94,12 @@ pub(crate) const BROKEN: &[Broken] = &[
         "polls_before_it_says_so",
         &[
             edit(
-                "bell",
+                "wake/bell",
                 "        self.polling.store(1, Ordering::Relaxed);\n",
                 "        let quiet = self.rings.load(Ordering::Relaxed) == seen;\n        self.polling.store(1, \
                  Ordering::Relaxed);\n",
             ),
-            edit("bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "quiet\n    }"),
+            edit("wake/bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "quiet\n    }"),
         ],
         "no_wake_up_is_lost_in_poll",
         ENDLESS,
@@ -107,7 +107,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // As for a futex, but there is no kernel that compares.
     broken(
         "polls_without_comparing",
-        &[edit("bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "true\n    }")],
+        &[edit("wake/bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "true\n    }")],
         "no_wake_up_is_lost_in_poll",
         ENDLESS,
     ),
@@ -115,7 +115,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "the_first_ringer_clears_polling",
         &[edit(
-            "bell",
+            "wake/bell",
             "step!(\"bell: rung\");\n        self.polling.load(Ordering::Relaxed) != 0",
             "let polling = self.polling.swap(0, Ordering::Relaxed) != 0;\n        step!(\"bell: rung\");\n        \
              polling",

@@ -17,16 +17,16 @@
 //! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the
 //! file `node`: the kernel drops that lock with the process, whatever killed it.
 
-use crate::doorbell;
-use crate::entry::{Entry, PARTICIPANTS_MAX, ParticipantInfo};
-use crate::files::{Directory, allocate, remove_if_empty};
-use crate::layout::{MAGIC, VERSION};
-use crate::lock::{self, AllHeld, Held};
-use crate::memory::{Located, Mapping, Shared, Use};
+use crate::memory::files::{Directory, allocate, remove_if_empty};
+use crate::memory::layout::{MAGIC, VERSION};
+use crate::memory::mapping::{Located, Mapping, Shared, Use};
 use crate::name::Name;
-use crate::node_error::{NodeError, REGISTRY_PATIENCE};
+use crate::node::entry::{Entry, PARTICIPANTS_MAX, ParticipantInfo};
+use crate::node::error::{NodeError, REGISTRY_PATIENCE};
+use crate::node::lock::{self, AllHeld, Held};
+use crate::slots::word::Claimant;
 use crate::step::step;
-use crate::word::Claimant;
+use crate::wake::doorbell;
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::{FileExt, MetadataExt};

@@ -4,12 +4,12 @@
 //! subscription's data have one id, so the newer replaces the older; commands each have their own, so none is ever
 //! replaced: the caller waits for the answer.
 
-use crate::full::OverflowPolicy;
 use crate::label::Label;
-use crate::layout::Shape;
+use crate::memory::layout::Shape;
 use crate::name::Name;
 use crate::package::Type;
-use crate::slots::{Posted, Slots};
+use crate::slots::full::OverflowPolicy;
+use crate::slots::protocol::{Posted, Slots};
 
 /// The last package of each state that this sender sent. Private to it, and bounded: whether one still waits, its word
 /// says.

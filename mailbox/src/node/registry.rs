@@ -1,20 +1,20 @@
 //! Making, adopting, replacing and removing mailboxes (`inspect` looks at them): the files of a node's directory are
 //! the registry. `owned` has what mailboxes and streams have in common.
 
-use crate::counters::Loss;
-use crate::files::{is_lack_of_descriptors, is_lack_of_memory};
-use crate::layout::{Shape, ShapeError};
-use crate::memory::Use;
+use crate::figures::counters::Loss;
+use crate::memory::files::{is_lack_of_descriptors, is_lack_of_memory};
+use crate::memory::layout::{Shape, ShapeError};
+use crate::memory::mapping::Use;
+use crate::memory::owned::{self, BadSegment, Owned, Refused};
+use crate::memory::segment::{Segment, WHAT, file_name};
 use crate::name::Name;
-use crate::node::{Node, RegistryLock};
-use crate::node_error::{NodeError, REGISTRY_PATIENCE};
-use crate::owned::{self, BadSegment, Owned, Refused};
-use crate::participant::Participant;
-use crate::queue::Queue;
+use crate::node::directory::{Node, RegistryLock};
+use crate::node::error::{NodeError, REGISTRY_PATIENCE};
+use crate::node::participant::Participant;
+use crate::node::unlink::unlink;
 use crate::receiver::Receiver;
-use crate::segment::{Segment, WHAT, file_name};
+use crate::slots::queue::Queue;
 use crate::step::step;
-use crate::unlink::unlink;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -42,7 +42,7 @@ pub enum CreateError {
     /// No memory, most likely.
     #[error(
         "mailbox {name}: {bytes} bytes of shared memory: {source}; is it full (df {})?",
-        crate::files::existing(.node).display()
+        crate::memory::files::existing(.node).display()
     )]
     Memory {
         /// Which mailbox.

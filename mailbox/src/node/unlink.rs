@@ -1,10 +1,10 @@
 //! Taking a mailbox's name away: its file goes, and the words beside it go before.
 
-use crate::about;
+use crate::memory::segment::file_name;
 use crate::name::Name;
-use crate::node::{Node, RegistryLock};
-use crate::node_error::NodeError;
-use crate::segment::file_name;
+use crate::node::about;
+use crate::node::directory::{Node, RegistryLock};
+use crate::node::error::NodeError;
 use crate::step::step;
 
 /// Takes a mailbox's name away; the caller owns it.

@@ -10,8 +10,8 @@
 //!                           └──▶ signals, and whether it has ended
 //! ```
 
-use crate::entry::ParticipantInfo;
-use crate::node::Node;
+use crate::node::directory::Node;
+use crate::node::entry::ParticipantInfo;
 use crate::sys::family::{has_ended, pidfd};
 use nix::errno::Errno;
 use nix::poll::PollTimeout;
@@ -170,7 +170,7 @@ fn is_lock_on(line: &str, inode: u64, byte: u64) -> bool {
 mod tests {
     use super::*;
     use crate::name::Name;
-    use crate::participant::Participant;
+    use crate::node::participant::Participant;
     use std::os::unix::process::ExitStatusExt;
     use std::process::{Child, Command};
     use std::sync::atomic::Ordering;

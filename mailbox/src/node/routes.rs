@@ -8,11 +8,11 @@
 //! This crate does not know why: the router of the node works it out from the configuration. The file appears whole. It
 //! is read only for a name that has no mailbox here, when a [`Sender`](crate::Sender) is opened.
 
-use crate::files::Directory;
-use crate::layout::{MAGIC, VERSION};
+use crate::memory::files::Directory;
+use crate::memory::layout::{MAGIC, VERSION};
 use crate::name::Name;
-use crate::node::Node;
-use crate::node_error::NodeError;
+use crate::node::directory::Node;
+use crate::node::error::NodeError;
 use std::io;
 
 /// Ranges that a node can have: all instances of every class of a system, alone.

@@ -10,8 +10,8 @@
 //! A participant that waits for file descriptors too sleeps in `poll` and has a named pipe `bell.N` in the node's
 //! directory; N is its place in the table. Ringers open it only while it sleeps there (see `bell`).
 
-use crate::entry::PARTICIPANTS_MAX;
-use crate::node::Node;
+use crate::node::directory::Node;
+use crate::node::entry::PARTICIPANTS_MAX;
 use crate::step::step;
 use nix::errno::Errno;
 use nix::fcntl::{OFlag, openat};

@@ -1,7 +1,7 @@
 //! Mailboxes that this process has mapped to send to them: each once. Without this table a process would map the
 //! router's mailbox once for each remote mailbox that it sends to.
 
-use crate::memory::{Mapping, Region, Use};
+use crate::memory::mapping::{Mapping, Region, Use};
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::MetadataExt;

@@ -1,15 +1,15 @@
 //! A mailbox's segment: the file, mapped and checked, and the bodies of its slots.
 
-use crate::bodies::Bodies;
 use crate::clock::monotonic_ns;
-use crate::files::Directory;
-use crate::layout::{Identity, PAGE, Page, SLOT_PREFIX, Shape};
-use crate::mapped;
-use crate::memory::{Located, Mapping, Rooms, Use};
+use crate::memory::files::Directory;
+use crate::memory::layout::{Identity, PAGE, Page, SLOT_PREFIX, Shape};
+use crate::memory::mapped;
+use crate::memory::mapping::{Located, Mapping, Rooms, Use};
+use crate::memory::owned::{BadFile, BadSegment};
 use crate::name::Name;
-use crate::owned::{BadFile, BadSegment};
 use crate::package::{HEAD_BYTES, Head};
-use crate::slots::{Claim, Slots, Taken};
+use crate::slots::bodies::Bodies;
+use crate::slots::protocol::{Claim, Slots, Taken};
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;

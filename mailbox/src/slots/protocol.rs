@@ -25,13 +25,13 @@
 //! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G)
 //! and (J).
 
-use crate::bodies::Bodies;
-use crate::full::{NoSlot, OverflowPolicy};
-use crate::hot::{Hot, rings};
 use crate::name::Priority;
+use crate::slots::bodies::Bodies;
+use crate::slots::full::{NoSlot, OverflowPolicy};
+use crate::slots::hot::{Hot, rings};
+use crate::slots::word::{Claimant, FREE, State, Victim, Word};
 use crate::step::step;
 use crate::sync::{AtomicU64, Ordering, fence, prefetch_to_write, seq_cst_accesses};
-use crate::word::{Claimant, FREE, State, Victim, Word};
 use std::hint::spin_loop;
 
 /// Most slots that a mailbox can have.

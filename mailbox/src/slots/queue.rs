@@ -3,11 +3,11 @@
 //! Holds hints only, one entry a slot: the word is asked again, by compare-and-swap, when a package is taken.
 //! Everything is allocated at the start.
 
-use crate::hot::HINT_WORDS;
 use crate::name::Priority;
-use crate::slots::{Slots, Taken};
+use crate::slots::hot::HINT_WORDS;
+use crate::slots::protocol::{Slots, Taken};
+use crate::slots::word::Word;
 use crate::sync::Ordering;
-use crate::word::Word;
 
 /// Every so many receives one word in turn is marked for the next look, hint or no hint: a sender may have died between
 /// publishing and setting it.

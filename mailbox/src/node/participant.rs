@@ -1,15 +1,15 @@
 //! A participant: one user of mailboxes on a node, mostly a process.
 
-use crate::doorbell;
-use crate::entry::{COMPLAINS, Entry, ModuleState, PARTICIPANTS_MAX};
-use crate::lock;
+use crate::figures::traffic::Table;
 use crate::name::Name;
-use crate::node::{Node, open_once_more};
-use crate::node_error::NodeError;
+use crate::node::directory::{Node, open_once_more};
+use crate::node::entry::{COMPLAINS, Entry, ModuleState, PARTICIPANTS_MAX};
+use crate::node::error::NodeError;
+use crate::node::lock;
+use crate::node::work::Work;
+use crate::slots::word::Claimant;
 use crate::step::step;
-use crate::traffic::Table;
-use crate::word::Claimant;
-use crate::work::Work;
+use crate::wake::doorbell;
 use std::fs::File;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -4,12 +4,12 @@
 //! All changes happen under the node's registry lock, and a file is only changed by the holder of its owner's lock. A
 //! file gets its name last, whole; so nobody ever opens half of one.
 
-use crate::files::{Unfit, allocate};
-use crate::layout::VERSION;
-use crate::lock::Held;
-use crate::memory::Use;
-use crate::node::{Node, RegistryLock};
-use crate::node_error::NodeError;
+use crate::memory::files::{Unfit, allocate};
+use crate::memory::layout::VERSION;
+use crate::memory::mapping::Use;
+use crate::node::directory::{Node, RegistryLock};
+use crate::node::error::NodeError;
+use crate::node::lock::Held;
 use crate::step::step;
 use std::fs::File;
 use std::io;

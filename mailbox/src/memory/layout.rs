@@ -11,13 +11,13 @@
 //!
 //! docs/src/shared-memory.md has the same for other languages.
 
-use crate::counters::{Counters, ROWS};
-use crate::full::OverflowPolicy;
-use crate::hot::{Hot, ReceiverSays};
-use crate::memory::Shared;
+use crate::figures::counters::{Counters, ROWS};
+use crate::memory::mapping::Shared;
 use crate::name::Name;
 use crate::package::{BODY_BYTES_MAX, HEAD_BYTES};
-use crate::slots::SLOTS_MAX;
+use crate::slots::full::OverflowPolicy;
+use crate::slots::hot::{Hot, ReceiverSays};
+use crate::slots::protocol::SLOTS_MAX;
 use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 use std::time::Duration;

@@ -5,8 +5,8 @@
 //! replaced just then, the count can be one too high, never too low: no loss is hidden.
 
 use crate::name::{Class, Priority};
+use crate::slots::word::Victim;
 use crate::step::step;
-use crate::word::Victim;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 

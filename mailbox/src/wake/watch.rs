@@ -1,9 +1,9 @@
 //! Waiting for file descriptors and mailboxes at once, by one thread: for drivers of serial ports, sockets and the
 //! like.
 
-use crate::bell::Bell;
-use crate::doorbell;
-use crate::participant::Participant;
+use crate::node::participant::Participant;
+use crate::wake::bell::Bell;
+use crate::wake::doorbell;
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::sync::Arc;

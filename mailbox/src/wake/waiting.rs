@@ -1,11 +1,11 @@
 //! Waiting for mailboxes and streams: how long, and whether awake for a moment before asleep.
 
-use crate::doorbell::Slept;
 use crate::name::Priority;
-use crate::participant::Participant;
+use crate::node::participant::Participant;
 use crate::receiver::{Package, Receiver};
 use crate::step::step;
-use crate::watch::Watches;
+use crate::wake::doorbell::Slept;
+use crate::wake::watch::Watches;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -185,7 +185,7 @@ pub fn wait_above(
             break;
         }
         if !receiver.has_unseen() {
-            slept += timed(|| _ = crate::doorbell::sleep(&entry.bell, seen, waiting.left()));
+            slept += timed(|| _ = crate::wake::doorbell::sleep(&entry.bell, seen, waiting.left()));
         }
     }
     receiver.awake();
@@ -223,7 +223,7 @@ impl Participant {
         if other() || waiting.is_over() {
             return Duration::ZERO;
         }
-        timed(|| _ = crate::doorbell::sleep(&self.entry().bell, seen, waiting.left()))
+        timed(|| _ = crate::wake::doorbell::sleep(&self.entry().bell, seen, waiting.left()))
     }
 }
 
@@ -345,7 +345,7 @@ fn settled<S: Source + ?Sized>(
         Some(watches) if idle => asleep(&mut || watches.sleep(entry.bell(), seen, waiting.left())),
         Some(watches) => watches.look(),
         None if idle => asleep(&mut || {
-            if crate::doorbell::sleep(&entry.bell, seen, waiting.left()) == Slept::NotAtAll {
+            if crate::wake::doorbell::sleep(&entry.bell, seen, waiting.left()) == Slept::NotAtAll {
                 came = Came::TooSoonToSleep;
             }
         }),

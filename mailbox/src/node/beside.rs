@@ -1,8 +1,8 @@
 //! Files that lie beside the mailboxes, for every process of the node to read: whole, and of words that this crate does
 //! not know.
 
-use crate::node::Node;
-use crate::node_error::NodeError;
+use crate::node::directory::Node;
+use crate::node::error::NodeError;
 use std::io;
 
 /// What a file is called while its one writer writes it.

@@ -1,12 +1,12 @@
 //! What everybody on a node sends, read from their tables (see `traffic`). Reading changes nothing.
 
 use crate::clock::monotonic_ns;
-use crate::entry::ParticipantInfo;
+use crate::figures::traffic::{FlowRow, Key, SECONDS_KEPT, TableView, Writer};
 use crate::name::Name;
-use crate::node::Node;
+use crate::node::directory::Node;
+use crate::node::entry::ParticipantInfo;
+use crate::node::participant::Participant;
 use crate::package::Type;
-use crate::participant::Participant;
-use crate::traffic::{FlowRow, Key, SECONDS_KEPT, TableView, Writer};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;

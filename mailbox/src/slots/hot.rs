@@ -2,10 +2,10 @@
 //! alert.
 //!
 //! None of it is the truth about a package; that is its word alone. All of it may be lost with a process that dies
-//! before it says it, and is then found by looking at the words (see the table in `slots`).
+//! before it says it, and is then found by looking at the words (see the table in `protocol`).
 
 use crate::name::Priority;
-use crate::slots::{SLOTS_MAX, Slots};
+use crate::slots::protocol::{SLOTS_MAX, Slots};
 use crate::step::step;
 use crate::sync::{AtomicU32, AtomicU64, Ordering, fence, prefetch_to_write, seq_cst_accesses};
 

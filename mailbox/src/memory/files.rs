@@ -6,7 +6,7 @@
 //! never through a link, never waiting for a pipe's other end, and used only if it is a file of a user that may write
 //! there. A file that appears whole is made exclusively under another name before.
 
-use crate::layout::PAGE;
+use crate::memory::layout::PAGE;
 use crate::step::step;
 use nix::errno::Errno;
 use nix::fcntl::{OFlag, openat, renameat};

@@ -1,15 +1,15 @@
 //! Mailboxes seen from outside: which there are, and what each says of itself. Looking changes nothing, asks nobody and
 //! needs no lock; so what is seen is a moment, and its parts are of moments that lie a little apart.
 
-use crate::counters::ClassTraffic;
-use crate::layout::Shape;
-use crate::lock;
+use crate::figures::counters::ClassTraffic;
+use crate::memory::layout::Shape;
+use crate::memory::owned::{BadSegment, OWNER_BYTE};
+use crate::memory::segment::{Segment, name_of};
 use crate::name::{Name, Priority};
-use crate::node::Node;
-use crate::node_error::NodeError;
-use crate::owned::{BadSegment, OWNER_BYTE};
-use crate::segment::{Segment, name_of};
-use crate::word::{Claimant, State, Victim, Word};
+use crate::node::directory::Node;
+use crate::node::error::NodeError;
+use crate::node::lock;
+use crate::slots::word::{Claimant, State, Victim, Word};
 use std::fs::File;
 use std::io;
 use std::sync::atomic::Ordering;

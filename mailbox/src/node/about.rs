@@ -2,10 +2,10 @@
 //!
 //! This crate does not know what it says. It appears whole, stays as long as the mailbox, and goes before it.
 
-use crate::beside::unfinished;
 use crate::name::Name;
-use crate::node::Node;
-use crate::node_error::NodeError;
+use crate::node::beside::unfinished;
+use crate::node::directory::Node;
+use crate::node::error::NodeError;
 
 fn file_name(name: Name) -> String {
     format!("{:08x}.about", name.raw())

@@ -12,17 +12,17 @@
 //! tells no times. A value published that finds none is not counted, since it is no package; those that carry it to
 //! subscribers are. A new participant of the same index makes a new file: readers of the old one are not confused.
 
-use crate::beside::unfinished;
 use crate::cell::SeqCount;
-use crate::files::{Directory, allocate};
-use crate::layout::{MAGIC, VERSION};
-use crate::memory::{Located, Mapping, Shared, Use};
+use crate::memory::files::{Directory, allocate};
+use crate::memory::layout::{MAGIC, VERSION};
+use crate::memory::mapping::{Located, Mapping, Shared, Use};
 use crate::name::Name;
-use crate::node::Node;
-use crate::node_error::NodeError;
+use crate::node::beside::unfinished;
+use crate::node::directory::Node;
+use crate::node::error::NodeError;
 use crate::package::Type;
+use crate::slots::word::Claimant;
 use crate::step::step;
-use crate::word::Claimant;
 use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 

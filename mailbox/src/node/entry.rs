@@ -1,8 +1,8 @@
 //! One participant's line in its node's table.
 
-use crate::bell::Bell;
 use crate::name::Name;
-use crate::work::{InHand, Mark};
+use crate::node::work::{InHand, Mark};
+use crate::wake::bell::Bell;
 use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 

@@ -1,8 +1,9 @@
 //! Why a node could not be used.
 
-use crate::entry::PARTICIPANTS_MAX;
-use crate::files::{Unfit, is_lack_of_descriptors, is_lack_of_memory};
-use crate::layout::VERSION;
+use crate::memory::files::existing;
+use crate::memory::files::{Unfit, is_lack_of_descriptors, is_lack_of_memory};
+use crate::memory::layout::VERSION;
+use crate::node::entry::PARTICIPANTS_MAX;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -29,7 +30,7 @@ pub enum NodeError {
     )]
     Version(PathBuf, u32),
     /// No memory, most likely.
-    #[error("node {path}: no shared memory: {source}; is it full (df {})?", crate::files::existing(path).display())]
+    #[error("node {path}: no shared memory: {source}; is it full (df {})?", existing(path).display())]
     Memory {
         /// Its directory.
         path: PathBuf,
