@@ -26,7 +26,9 @@ fn configured(place: &Place, settings: &str, keys: &str) -> PathBuf {
 /// Both nodes, with these further words for launch.
 fn both(place: &Place, words: &[&str]) -> Option<(Running, PathBuf)> {
     let config = configured(place, "", "");
-    Some((launched_all(place, &config, &["base", "arm"], words)?, config))
+    let launch = launched_all(place, &config, &["base", "arm"], words)?;
+    assert_has(&launch.out(), ["│ node base of test runs: 2 modules", "│ node arm of test runs: 2 modules"]);
+    Some((launch, config))
 }
 
 /// Processes that a process has started, recursively.
@@ -44,7 +46,6 @@ fn devices() -> BTreeSet<std::ffi::OsString> {
 fn nodes_start_talk_and_are_stopped() {
     let (place, before) = (Place::new(), devices());
     let Some((mut launch, config)) = both(&place, &[]) else { return };
-    assert_has(&launch.out(), ["│ node base of test runs: 2 modules", "│ node arm of test runs: 2 modules"]);
     assert!(launch.out().starts_with("security = \"none\": packages between nodes are neither sealed nor signed"));
     assert_eq!(place.say_at(&config, "base", &["call", "probe.1", "count", "1"]).ok(), "1\n");
     assert_eq!(place.say_at(&config, "arm", &["call", "probe.0", "count", "2"]).ok(), "1\n");

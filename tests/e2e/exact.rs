@@ -3,7 +3,7 @@
 use crate::harness::{Place, RECORDED_CLASSES, Robot, halt, json_lines, signal, times, until};
 use crate::load::Load;
 use crate::process::{Running, Said};
-use crate::recordings::messages;
+use crate::recordings::messages_so_far;
 use crate::seer::{NOTHING, OTHER_BUILD, OTHER_QUESTIONS, entry};
 use nix::sys::signal::Signal;
 use rohrpost_modules::journal::Piece;
@@ -96,7 +96,7 @@ fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str
 /// Messages of a journal in a file that is being written, if they are so.
 pub(crate) fn count(file: &Path, module: &str, is_so: impl Fn(&[u8]) -> bool) -> usize {
     let topic = format!("{module}/journal");
-    messages(file, |channel, message| (channel.topic == topic && is_so(message.data)).then_some(())).len()
+    messages_so_far(file, |channel, message| (channel.topic == topic && is_so(message.data)).then_some(())).len()
 }
 
 fn journaled(file: &Path, module: &str) -> usize {

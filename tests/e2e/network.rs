@@ -39,7 +39,9 @@ pub(crate) fn launched_all(place: &Place, config: &Path, nodes: &[&str], words: 
     let mut launch = place.start(&[&["launch", config.to_str().unwrap(), "--all"], words].concat());
     until("all nodes run", || {
         let out = launch.out();
-        let runs = |node: &&str| out.contains(&format!("│ node {node} of test runs: "));
+        // Whole lines: what is read of one may end anywhere.
+        let lines = || out.split_inclusive('\n').filter(|line| line.ends_with('\n'));
+        let runs = |node: &&str| lines().any(|line| line.contains(&format!("│ node {node} of test runs: ")));
         launch.ended().is_some() || nodes.iter().all(runs)
     });
     if launch.ended().is_some() {

@@ -169,7 +169,7 @@ pub(crate) fn feed_until_recorded(place: &Place, module: &str) {
 
 /// Messages of a topic in a file but those that it repeats, also in one that is being written.
 fn messages<T>(file: &Path, topic: &str, read: impl Fn(&[u8]) -> T) -> Vec<T> {
-    recordings::messages(file, |channel, message| {
+    recordings::messages_so_far(file, |channel, message| {
         (channel.topic == topic && !channel.is_repeated()).then(|| read(message.data))
     })
 }

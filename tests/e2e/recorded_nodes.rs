@@ -3,7 +3,7 @@
 use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, until};
 use crate::network::{NETWORK, at, launched_all, nodes};
 use crate::recorded::{feed, feed_until_recorded, feeder_entry, lines, number};
-use crate::recordings::messages;
+use crate::recordings::messages_so_far;
 use rohrpost_recording::{Message, info};
 use std::path::Path;
 use std::time::Duration;
@@ -32,7 +32,7 @@ const REPEATS_REFUSED: Duration = Duration::from_secs(3);
 /// Numbers of packages and of the values in them.
 pub(crate) fn values(file: &Path, topic: &str) -> Vec<(u32, u64)> {
     let value = |message: &Message<'_>| (message.sequence, number(topic, message.data));
-    messages(file, |channel, message| (channel.topic == topic).then(|| value(message)))
+    messages_so_far(file, |channel, message| (channel.topic == topic).then(|| value(message)))
 }
 
 /// Feeds until one that was sent after `target` values is in the file: all before it are there, or known to be missing.

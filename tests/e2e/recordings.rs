@@ -30,17 +30,28 @@ pub(crate) fn end(place: &Place, stem: &str, writer: Writer) -> PathBuf {
     place.path(&format!("{stem}-0001.mcap"))
 }
 
-/// What is made of messages of a file, which may be one that is being written.
+/// What is made of the messages of a whole file.
 pub(crate) fn messages<T>(file: &Path, mut read: impl FnMut(&RecordedChannel, &Message<'_>) -> Option<T>) -> Vec<T> {
-    let is_whole = is_closed(file).unwrap_or(false);
+    let mut made = Vec::new();
+    let mut reader = Reader::open(file).unwrap();
+    while let Some((channel, message)) = reader.next().unwrap() {
+        made.extend(read(&channel, &message));
+    }
+    made
+}
+
+/// The same of a file that may be one that is being written: of what is there so far.
+pub(crate) fn messages_so_far<T>(
+    file: &Path,
+    mut read: impl FnMut(&RecordedChannel, &Message<'_>) -> Option<T>,
+) -> Vec<T> {
+    if is_closed(file).unwrap_or(false) {
+        return messages(file, read);
+    }
     let mut made = Vec::new();
     let Ok(mut reader) = Reader::open(file) else { return made };
-    loop {
-        match reader.next() {
-            Ok(Some((channel, message))) => made.extend(read(&channel, &message)),
-            Ok(None) => return made,
-            Err(error) if is_whole => panic!("{}: {error}", file.display()),
-            Err(_) => return made,
-        }
+    while let Ok(Some((channel, message))) = reader.next() {
+        made.extend(read(&channel, &message));
     }
+    made
 }

@@ -204,6 +204,7 @@ impl Player {
             let Some(reader) = &mut self.reader else { continue };
             match reader.seek(arrival_ns) {
                 Ok(true) => {
+                    reader.read_ahead()?;
                     self.find_older(arrival_ns);
                     return Ok(true);
                 }
@@ -303,6 +304,7 @@ impl Player {
                 if !self.open_next()? {
                     return Ok(Advanced::ToEnd);
                 }
+                self.reader.as_mut().map_or(Ok(()), Reader::read_ahead)?;
                 continue;
             };
             if passed > PASSED_BYTES_MAX {

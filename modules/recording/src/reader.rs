@@ -3,12 +3,11 @@
 use crate::batch::Message;
 use crate::error::ReadError;
 use crate::format::{is_of_others, key};
-use crate::read::ahead::ReadAhead;
 use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::Definition;
 use crate::read::frames::Frames;
 use crate::read::index::Index;
-use crate::read::ordered::TimePlan;
+use crate::read::ordered::{OrderedBatch, TimePlan};
 use crate::read::selected::Selected;
 use crate::selection::{SelectError, Selection};
 use rohrpost_schema::Type;
@@ -16,6 +15,7 @@ use rohrpost_schema::plain::ForeignText;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::Receiver;
 
 /// A channel, as a file describes it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -82,31 +82,27 @@ enum ReaderSource {
     /// From its beginning on.
     Whole(Contents),
     Part(Selected),
-    Played(PlayedFile),
+    /// In the order of time.
+    InTime(ReaderInTime),
 }
 
-/// A file that a thread reads ahead.
-struct PlayedFile {
+/// Messages that a thread puts in the order of time.
+struct ReaderInTime {
     path: PathBuf,
-    /// In the order of time; none: in that of the file.
-    plan: Option<TimePlan>,
-    from_ns: u64,
-    /// None until the first message is asked for.
-    ahead: Option<ReadAhead>,
+    plan: TimePlan,
+    batches: Receiver<Result<OrderedBatch, ReadError>>,
+    batch: OrderedBatch,
     file_bytes: u64,
 }
 
-impl PlayedFile {
+impl ReaderInTime {
     fn next(&mut self) -> Result<Option<Found>, ReadError> {
-        let Self { path, plan, from_ns, ahead, .. } = self;
-        let ahead = match ahead {
-            Some(ahead) => ahead,
-            None => ahead.insert(match plan {
-                Some(plan) => plan.read(path, *from_ns)?,
-                None => ReadAhead::in_file_order(path, *from_ns)?,
-            }),
-        };
-        ahead.next()
+        if self.batch.found.is_empty() {
+            // Its thread has ended behind the last one.
+            let Ok(told) = self.batches.recv() else { return Ok(None) };
+            self.batch = told?;
+        }
+        Ok(self.batch.found.pop_front())
     }
 }
 
@@ -127,15 +123,17 @@ impl Reader {
         Ok(Self::of(ReaderSource::Part(Selected::open(path, selection)?)))
     }
 
-    /// As [`Self::open`], to be played: a thread reads the file and unpacks its chunks before they are asked for.
-    /// Messages of another program's file come in the order of time, which need not be that of the file. In ours, time
-    /// steps where it stepped while it was recorded.
+    /// As [`Self::open`], to be played: messages of another program's file come in the order of time, which need not be
+    /// that of the file. In ours, time steps where it stepped while it was recorded.
     pub(crate) fn to_play(path: &Path) -> Result<Self, ReadError> {
-        let is_of_others = Contents::header_of(path)?.is_some_and(|header| is_of_others(&header));
-        let plan = is_of_others.then(|| TimePlan::of(path)).transpose()?;
+        if !Contents::header_of(path)?.is_some_and(|header| is_of_others(&header)) {
+            return Self::open(path);
+        }
+        let plan = TimePlan::of(path)?;
+        let batches = plan.read(path, 0)?;
         let file_bytes = Frames::open(path)?.len();
-        let played = PlayedFile { path: path.to_owned(), plan, from_ns: 0, ahead: None, file_bytes };
-        Ok(Self::of(ReaderSource::Played(played)))
+        let (path, batch) = (path.to_owned(), OrderedBatch::default());
+        Ok(Self::of(ReaderSource::InTime(ReaderInTime { path, plan, batches, batch, file_bytes })))
     }
 
     fn of(source: ReaderSource) -> Self {
@@ -164,8 +162,8 @@ impl Reader {
                 *contents = contents.at_first_chunk(|chunk| chunk.message_end_time >= arrival_ns)?;
                 self.is_ahead = false;
             }
-            ReaderSource::Played(its) => {
-                (its.from_ns, its.ahead) = (arrival_ns, None);
+            ReaderSource::InTime(its) => {
+                (its.batches, its.batch) = (its.plan.read(&its.path, arrival_ns)?, OrderedBatch::default());
                 self.is_ahead = false;
             }
             ReaderSource::Part(_) => {}
@@ -179,6 +177,15 @@ impl Reader {
                     return Ok(self.is_ahead);
                 }
             }
+        }
+    }
+
+    /// From here on a thread reads the file and unpacks its chunks before they are asked for. What is
+    /// [selected](Reader::select) is read when it is asked for.
+    pub(crate) fn read_ahead(&mut self) -> Result<(), ReadError> {
+        match &mut self.source {
+            ReaderSource::Whole(contents) => contents.read_ahead(),
+            ReaderSource::Part(_) | ReaderSource::InTime(_) => Ok(()),
         }
     }
 
@@ -211,9 +218,7 @@ impl Reader {
         match &self.source {
             ReaderSource::Whole(contents) => (contents.at(), contents.file_bytes()),
             ReaderSource::Part(selected) => (selected.at(), selected.file_bytes()),
-            ReaderSource::Played(its) => {
-                (its.ahead.as_ref().map_or(0, |ahead| ahead.batch().read_bytes), its.file_bytes)
-            }
+            ReaderSource::InTime(its) => (its.batch.read_bytes, its.file_bytes),
         }
     }
 
@@ -223,7 +228,7 @@ impl Reader {
         match &self.source {
             ReaderSource::Whole(contents) => contents.ending() == Some(Ending::Closed),
             ReaderSource::Part(_) => true,
-            ReaderSource::Played(its) => its.ahead.as_ref().is_some_and(|ahead| ahead.batch().is_closed),
+            ReaderSource::InTime(its) => its.plan.is_closed(),
         }
     }
 }
@@ -233,7 +238,7 @@ impl ReaderSource {
         let contents = match self {
             Self::Whole(contents) => contents,
             Self::Part(selected) => return selected.next(),
-            Self::Played(its) => return its.next(),
+            Self::InTime(its) => return its.next(),
         };
         while let Some(item) = contents.next()? {
             match item {
@@ -249,7 +254,7 @@ impl ReaderSource {
         match self {
             Self::Whole(contents) => contents.data(found),
             Self::Part(selected) => selected.data(found),
-            Self::Played(its) => its.ahead.as_ref().map_or(&[], |ahead| ahead.data(found)),
+            Self::InTime(its) => found.data_in(&its.batch.data),
         }
     }
 }

@@ -163,6 +163,7 @@ pub(crate) fn flows_keep_their_bounds(
         drop(ending);
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
     });
+    assert!(published.iter().all(|times_ns| !times_ns.is_empty()), "each flow publishes");
     come.all(&published);
     let crossed = capture.end();
     assert_inside(beside, segment, &validate(&crossed, segment.time_of(0)));

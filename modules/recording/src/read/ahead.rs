@@ -1,166 +1,231 @@
-//! A thread that reads a file ahead: its messages are there before they are asked for.
+//! A thread that reads a file ahead: records are read, and chunks unpacked, before they are asked for.
 //!
 //! Unpacking a chunk takes milliseconds, and a disk may take longer. A replay, which plays messages at their times, has
 //! none to spare. What waits is bounded, so memory stays the same however long the file is.
 
-use crate::error::{ReadError, Shown};
-use crate::read::contents::{Contents, Ending, Found, Item};
+use crate::error::{Damage, ReadError};
+use crate::format::op;
+use crate::read::chunk;
+use crate::read::frames::{Frames, HEAD_BYTES, Step};
 use std::collections::VecDeque;
-use std::path::Path;
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// So much is handed over at once, unless one message is longer, and so often ahead: some chunks of ours in all, more
-/// than a burst of pictures and clouds fills.
-pub(crate) const BATCH_BYTES: usize = 2 << 20;
-const BATCHES_AHEAD: usize = 2;
+/// The thread reads on while less memory waits: some chunks of ours, more than a burst of pictures and clouds fills.
+const AHEAD_BYTES: usize = 8 << 20;
+/// Buffers that were used and are kept for what is read next, and the largest of them: none of ours is larger, unless
+/// for a single message.
+const SPARE_MAX: usize = 4;
+const SPARE_BYTES_MAX: usize = 2 << 20;
 
-/// Messages that follow each other.
+/// Records of a file, read by a thread. It ends with this.
+pub(crate) struct ReadAhead(Arc<Passage>);
+
+/// What is at a place of a file.
+pub(crate) struct AheadRecord {
+    /// Where it begins.
+    pub(crate) begins: u64,
+    /// Where the next one does.
+    pub(crate) ends: u64,
+    /// From where on records are searched for if this is none, or behind this one: behind an index of messages that was
+    /// passed over, and of a chunk that was unpacked.
+    pub(crate) resume_at: Option<u64>,
+    pub(crate) step: Result<Step, ReadError>,
+    /// Its bytes; of a chunk that was unpacked, the records in it.
+    pub(crate) body: Vec<u8>,
+    /// Of a whole chunk: whether it could be unpacked.
+    pub(crate) unpacked: Option<Result<(), Damage>>,
+}
+
+impl AheadRecord {
+    /// Memory that it takes, also if it has no bytes.
+    fn memory(&self) -> usize {
+        size_of::<Self>() + self.body.capacity()
+    }
+}
+
+/// What the thread and its reader share.
 #[derive(Default)]
-pub(crate) struct MessageBatch {
-    data: Vec<u8>,
-    /// What is wrong with the file, too, where it is.
-    pub(crate) found: VecDeque<Result<Found, ReadError>>,
-    /// So many bytes of the file are read.
-    pub(crate) read_bytes: u64,
-    /// The file is read to its end, and was closed there.
-    pub(crate) is_closed: bool,
+struct Passage {
+    waiting: Mutex<WaitingRecords>,
+    changed: Condvar,
 }
 
-impl MessageBatch {
-    /// Errors are told at once. Messages need not have data, and take memory all the same.
-    pub(crate) fn is_full(&self) -> bool {
-        let has_failed = matches!(self.found.back(), Some(Err(_)));
-        has_failed || self.data.len() + self.found.len() * size_of::<Found>() >= BATCH_BYTES
-    }
-
-    pub(crate) fn push(&mut self, found: &Found, data: &[u8]) {
-        self.found.push_back(Ok(found.copied(data, &mut self.data)));
-    }
-
-    pub(crate) fn fail(&mut self, error: ReadError) {
-        self.found.push_back(Err(error));
-    }
-}
-
-/// Messages of a file, read by a thread. It ends with this.
-pub(crate) struct ReadAhead {
-    batches: Receiver<MessageBatch>,
-    batch: MessageBatch,
+#[derive(Default)]
+struct WaitingRecords {
+    records: VecDeque<AheadRecord>,
+    /// Memory of these.
+    bytes: usize,
+    spare: Vec<Vec<u8>>,
+    /// The thread reads no further, or nobody wants it to.
+    is_over: bool,
 }
 
 impl ReadAhead {
-    /// `fill` reads the next messages of the file, and none at its end.
-    pub(crate) fn start(path: &Path, fill: impl FnMut(&mut MessageBatch) + Send + 'static) -> Result<Self, ReadError> {
-        let mut fill = fill;
-        let (sender, batches) = sync_channel(BATCHES_AHEAD);
+    /// Reads from where these frames are. None if there is no thread to be had.
+    pub(crate) fn start(frames: Frames) -> Option<Self> {
+        let passage = Arc::new(Passage::default());
+        let own = passage.clone();
         let read = move || {
-            loop {
-                let mut batch = MessageBatch::default();
-                fill(&mut batch);
-                let is_last = batch.found.is_empty();
-                if sender.send(batch).is_err() || is_last {
-                    return;
-                }
-            }
+            // Also if it panics: its reader must not wait for ever.
+            let _end = EndOfReading(&own);
+            read_all(frames, &own);
         };
         let thread = std::thread::Builder::new().name("reading ahead".into()).spawn(read);
-        thread.map_err(|error| ReadError::Io { path: Shown(path.to_owned()), error })?;
-        Ok(Self { batches, batch: MessageBatch::default() })
+        thread.is_ok().then_some(Self(passage))
     }
 
-    /// Messages in the order of the file, from the first chunk on that may have some of this time or later.
-    pub(crate) fn in_file_order(path: &Path, from_ns: u64) -> Result<Self, ReadError> {
-        let contents = Contents::open(path)?;
-        let mut contents = Some(match from_ns {
-            0 => contents,
-            _ => contents.at_first_chunk(|chunk| chunk.message_end_time >= from_ns)?,
-        });
-        Self::start(path, move |batch| {
-            if let Some(reading) = &mut contents
-                && has_failed(reading, batch)
-            {
-                contents = None;
+    /// The next record; waits for it. None once the thread has ended: behind the last record, or an error.
+    pub(crate) fn next(&mut self) -> Option<AheadRecord> {
+        let mut waiting = self.0.lock();
+        loop {
+            if let Some(record) = waiting.records.pop_front() {
+                waiting.bytes -= record.memory();
+                self.0.changed.notify_all();
+                return Some(record);
             }
-        })
-    }
-
-    /// The next message; waits for it. None at the end.
-    pub(crate) fn next(&mut self) -> Result<Option<Found>, ReadError> {
-        if self.batch.found.is_empty() {
-            // The thread has ended behind the last one.
-            let Ok(batch) = self.batches.recv() else { return Ok(None) };
-            self.batch = batch;
+            if waiting.is_over {
+                return None;
+            }
+            waiting = self.0.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);
         }
-        self.batch.found.pop_front().transpose()
     }
 
-    /// The bytes of the message that came last.
-    pub(crate) fn data(&self, found: &Found) -> &[u8] {
-        found.data_in(&self.batch.data)
-    }
-
-    /// The messages that came last, and those behind them.
-    pub(crate) fn batch(&self) -> &MessageBatch {
-        &self.batch
+    /// A buffer that is used no more.
+    pub(crate) fn give_back(&mut self, buffer: Vec<u8>) {
+        self.0.lock().keep(buffer);
     }
 }
 
-/// Fills a batch in the order of the file; whether that cannot be read any further.
-fn has_failed(contents: &mut Contents, batch: &mut MessageBatch) -> bool {
-    while !batch.is_full() {
-        match contents.next() {
-            Ok(Some(Item::Message(found))) => batch.push(&found, contents.data(&found)),
-            Ok(Some(Item::Damaged(at, what))) => batch.fail(contents.damaged(at, what)),
-            Ok(Some(Item::Metadata(_) | Item::Attachment(_))) => {}
-            Ok(None) => break,
-            Err(error) => {
-                let is_io = matches!(error, ReadError::Io { .. });
-                batch.fail(error);
-                return is_io;
-            }
+impl WaitingRecords {
+    fn keep(&mut self, buffer: Vec<u8>) {
+        if self.spare.len() < SPARE_MAX && buffer.capacity() <= SPARE_BYTES_MAX {
+            self.spare.push(buffer);
         }
     }
-    batch.read_bytes = contents.at();
-    batch.is_closed = contents.ending() == Some(Ending::Closed);
-    false
+}
+
+impl Drop for ReadAhead {
+    fn drop(&mut self) {
+        self.0.end();
+    }
+}
+
+struct EndOfReading<'a>(&'a Passage);
+
+impl Drop for EndOfReading<'_> {
+    fn drop(&mut self) {
+        self.0.end();
+    }
+}
+
+impl Passage {
+    fn lock(&self) -> MutexGuard<'_, WaitingRecords> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn end(&self) {
+        self.lock().is_over = true;
+        self.changed.notify_all();
+    }
+
+    /// A buffer for the next record, once there is room for it; none if nobody wants it any more.
+    fn room(&self) -> Option<Vec<u8>> {
+        let mut waiting = self.lock();
+        while waiting.bytes >= AHEAD_BYTES && !waiting.is_over {
+            waiting = self.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);
+        }
+        (!waiting.is_over).then(|| waiting.spare.pop().unwrap_or_default())
+    }
+
+    fn is_over(&self) -> bool {
+        self.lock().is_over
+    }
+
+    fn put(&self, mut record: AheadRecord) {
+        // A few bytes in a large buffer are copied: that serves the next large record.
+        let large = (record.body.len() < record.body.capacity() / 4).then(|| {
+            let exact = record.body.as_slice().into();
+            std::mem::replace(&mut record.body, exact)
+        });
+        let mut waiting = self.lock();
+        large.into_iter().for_each(|buffer| waiting.keep(buffer));
+        waiting.bytes += record.memory();
+        waiting.records.push_back(record);
+        self.changed.notify_all();
+    }
+}
+
+fn read_all(mut frames: Frames, passage: &Passage) {
+    while let Some(mut body) = passage.room() {
+        let (mut begins, mut step, mut resume_at) = (frames.at(), frames.step(), None);
+        // They say where messages are in a chunk, and these are read in turn.
+        while let Ok(Step::Record(op @ op::MESSAGE_INDEX)) = step
+            && chunk::is_exact(op, frames.body())
+            && !passage.is_over()
+        {
+            resume_at = Some(frames.at());
+            (begins, step) = (frames.at(), frames.step());
+        }
+        let mut unpacked = None;
+        if let Ok(Step::Record(op @ op::CHUNK)) = step {
+            let is_exact = chunk::is_exact(op, frames.body());
+            resume_at = Some(if is_exact { frames.at() } else { begins + HEAD_BYTES as u64 });
+            unpacked = Some(chunk::unpack(frames.body(), &mut body));
+        } else {
+            frames.swap_body(&mut body);
+        }
+        let goes_on = matches!(step, Ok(Step::Record(op)) if op != op::FOOTER);
+        passage.put(AheadRecord { begins, ends: frames.at(), resume_at, step, body, unpacked });
+        if !goes_on {
+            return;
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::op;
     use std::io::Write;
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
+    /// Of each record.
+    const BYTES: usize = 1 << 20;
     /// Five times as many as may wait.
-    const BATCHES: usize = 5 * BATCHES_AHEAD;
+    const RECORDS: usize = 5 * AHEAD_BYTES / BYTES;
 
-    /// Batches of an error each; how many were filled.
-    fn counted(most: usize) -> (ReadAhead, Arc<AtomicUsize>) {
-        let filled = Arc::new(AtomicUsize::new(0));
-        let count = filled.clone();
-        let fill = move |batch: &mut MessageBatch| {
-            if count.fetch_add(1, Relaxed) < most {
-                batch.fail(ReadError::NotMcap { path: Shown("a.mcap".into()) });
-            }
-        };
-        (ReadAhead::start(Path::new("a.mcap"), fill).unwrap(), filled)
+    /// A file of records that say nothing.
+    fn file() -> tempfile::NamedTempFile {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(mcap::MAGIC).unwrap();
+        let mut record = vec![0; BYTES];
+        record[0] = 0x80;
+        record[1..9].copy_from_slice(&(BYTES as u64 - 9).to_le_bytes());
+        (0..RECORDS).for_each(|_| file.write_all(&record).unwrap());
+        file
     }
 
     #[test]
     fn all_is_read_and_no_more_waits_than_there_is_room_for() {
-        let (mut ahead, filled) = counted(BATCHES);
-        for taken in 0..BATCHES {
-            // Until it stands still, or has read all: one more is filled, and waits for its place.
-            let wanted = (taken + BATCHES_AHEAD + 1).min(BATCHES + 1);
-            while filled.load(Relaxed) < wanted {
+        let file = file();
+        let mut ahead = ReadAhead::start(Frames::open(file.path()).unwrap()).unwrap();
+        let mut ends = Vec::new();
+        while let Some(record) = ahead.next() {
+            ends.push((record.ends, record.step.unwrap()));
+            // Until it stands still, or has read all.
+            loop {
+                let waiting = ahead.0.lock();
+                assert!(waiting.bytes < AHEAD_BYTES + 2 * BYTES + 1024, "{} bytes wait", waiting.bytes);
+                assert!(waiting.spare.len() <= SPARE_MAX);
+                if waiting.is_over || waiting.bytes >= AHEAD_BYTES {
+                    break;
+                }
+                drop(waiting);
                 std::thread::yield_now();
             }
-            assert!(filled.load(Relaxed) <= wanted, "{} are filled behind {taken}", filled.load(Relaxed));
-            assert!(ahead.next().is_err());
+            ahead.give_back(record.body);
         }
-        assert!(matches!((ahead.next(), ahead.next()), (Ok(None), Ok(None))));
+        let end = |number: usize| (mcap::MAGIC.len() + number * BYTES) as u64;
+        let records = (1..=RECORDS).map(|number| (end(number), Step::Record(0x80)));
+        assert_eq!(ends, records.chain([(end(RECORDS), Step::End)]).collect::<Vec<_>>());
     }
 
     /// As many as a hostile file has: records without bytes, and chunks that unpack to nothing right.
@@ -168,7 +233,7 @@ mod tests {
     fn what_has_no_bytes_takes_room_as_well() {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(mcap::MAGIC).unwrap();
-        let zeros = zstd::encode_all(&vec![0; 16 << 20][..], 1).unwrap();
+        let zeros = zstd_of_zeros(16 << 20);
         let mut chunk = vec![op::CHUNK];
         chunk.extend_from_slice(&(44 + zeros.len() as u64).to_le_bytes());
         chunk.extend_from_slice(&[0; 16]);
@@ -179,24 +244,39 @@ mod tests {
         chunk.extend_from_slice(b"zstd");
         chunk.extend_from_slice(&(zeros.len() as u64).to_le_bytes());
         chunk.extend_from_slice(&zeros);
+        let empty = [0x80, 0, 0, 0, 0, 0, 0, 0, 0];
         (0..8).for_each(|_| file.write_all(&chunk).unwrap());
-        file.write_all(&[0x80, 0, 0, 0, 0, 0, 0, 0, 0].repeat(1 << 20)).unwrap();
-        let mut contents = Contents::open(file.path()).unwrap();
-        for number in 0..8 {
-            let mut batch = MessageBatch::default();
-            assert!(!has_failed(&mut contents, &mut batch));
-            assert_eq!((batch.found.len(), batch.data.capacity(), batch.is_full()), (1, 0, true), "{number}");
+        file.write_all(&empty.repeat(2 * AHEAD_BYTES / size_of::<AheadRecord>())).unwrap();
+        let mut ahead = ReadAhead::start(Frames::open(file.path()).unwrap()).unwrap();
+        loop {
+            let waiting = ahead.0.lock();
+            let memory: usize = waiting.records.iter().map(AheadRecord::memory).sum();
+            assert!(memory == waiting.bytes && memory < AHEAD_BYTES + 1024, "{memory} bytes wait");
+            if waiting.bytes >= AHEAD_BYTES {
+                break;
+            }
+            assert!(!waiting.is_over, "all of it waits");
+            drop(waiting);
+            std::thread::yield_now();
         }
-        let mut batch = MessageBatch::default();
-        assert!(!has_failed(&mut contents, &mut batch) && batch.found.is_empty() && !batch.is_closed);
+        for _ in 0..8 {
+            assert!(ahead.next().unwrap().unpacked.unwrap().is_err());
+        }
+        assert_eq!(ahead.next().unwrap().step.unwrap(), Step::Record(0x80));
+    }
+
+    fn zstd_of_zeros(bytes: usize) -> Vec<u8> {
+        zstd::encode_all(&vec![0; bytes][..], 1).unwrap()
     }
 
     #[test]
     fn the_thread_ends_with_its_reader() {
-        let (ahead, filled) = counted(usize::MAX);
+        let file = file();
+        let ahead = ReadAhead::start(Frames::open(file.path()).unwrap()).unwrap();
+        let passage = Arc::downgrade(&ahead.0);
         drop(ahead);
-        // Only the thread has it, too.
-        while Arc::strong_count(&filled) > 1 {
+        // Only the thread has it now.
+        while passage.strong_count() > 0 {
             std::thread::yield_now();
         }
     }

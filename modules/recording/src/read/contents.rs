@@ -4,6 +4,7 @@ mod outside;
 
 use crate::error::{Damage, FileLimit, ReadError, Shown};
 use crate::format::{is_our_word, op};
+use crate::read::ahead::ReadAhead;
 use crate::read::attachment::Attachment;
 use crate::read::chunk;
 use crate::read::definitions::{Definition, Definitions, Untaken};
@@ -42,6 +43,8 @@ pub(crate) struct Contents {
     /// What is wrong with how it begins is told.
     has_told_magic: bool,
     ending: Option<Ending>,
+    /// What reads on, if that is a thread.
+    ahead: Option<ReadAhead>,
 }
 
 /// How a file ends.
@@ -121,6 +124,7 @@ impl Contents {
             is_behind_data: false,
             has_told_magic: false,
             ending: None,
+            ahead: None,
         }
     }
 
@@ -226,8 +230,19 @@ impl Contents {
         Ok(None)
     }
 
+    /// From here on a thread reads the file, until it is to be read elsewhere.
+    pub(crate) fn read_ahead(&mut self) -> Result<(), ReadError> {
+        if self.ahead.is_none() && self.ending.is_none() {
+            let mut frames = Frames::open(self.path())?;
+            frames.seek(self.frames.at())?;
+            self.ahead = ReadAhead::start(frames);
+        }
+        Ok(())
+    }
+
     /// Goes to the chunk there; then [`Contents::next_in_chunk`] has its messages.
     pub(crate) fn open_chunk(&mut self, at: u64) -> Result<(), ReadError> {
+        self.ahead = None;
         self.frames.seek(at)?;
         self.begins = at;
         match self.frames.step()? {
@@ -243,7 +258,7 @@ impl Contents {
 
     /// Reads on from there, where a record of the file begins.
     pub(crate) fn go_to(&mut self, at: u64) -> Result<(), ReadError> {
-        (self.in_chunk, self.resume_at) = (None, at);
+        (self.in_chunk, self.ahead, self.resume_at) = (None, None, at);
         self.frames.seek(at)
     }
 

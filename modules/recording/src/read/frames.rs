@@ -86,6 +86,16 @@ impl Frames {
         Ok(())
     }
 
+    /// Exchanges the bytes of the last step for a buffer.
+    pub(crate) fn swap_body(&mut self, buffer: &mut Vec<u8>) {
+        std::mem::swap(&mut self.body, buffer);
+    }
+
+    /// The next record is there: what is before it was read by others.
+    pub(crate) fn pass_to(&mut self, at: u64) {
+        self.at = at;
+    }
+
     /// The next record.
     pub(crate) fn step(&mut self) -> Result<Step, ReadError> {
         match self.head()? {
@@ -148,9 +158,9 @@ impl Frames {
     /// Fills a buffer with the bytes there, as many as there are. The next step is behind them.
     pub(crate) fn bytes_at(&mut self, at: u64, buffer: &mut Vec<u8>, wanted: usize) -> Result<(), ReadError> {
         self.seek(at)?;
-        std::mem::swap(&mut self.body, buffer);
+        self.swap_body(buffer);
         let told = self.fill(wanted as u64);
-        std::mem::swap(&mut self.body, buffer);
+        self.swap_body(buffer);
         told.map(drop)
     }
 

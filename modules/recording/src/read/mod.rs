@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Frames ──record by record──▶ chunk::unpack ──▶ Contents ──messages, metadata, damage──▶ recover, merge, info
-//!                                                      └── ReadAhead, a thread ──▶ Reader, for replay
+//!        └────── ReadAhead, a thread ──────┘
 //!        └─from the end──────▶ Index ──which chunk is where──▶ Selected ──▶ cut, draw, Reader
 //! ```
 //!

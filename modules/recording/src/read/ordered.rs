@@ -10,7 +10,6 @@
 
 use crate::error::{Damage, FileLimit, ReadError};
 use crate::format::HELD_BYTES_MAX;
-use crate::read::ahead::{MessageBatch, ReadAhead};
 use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::Definitions;
 use crate::read::frames::Frames;
@@ -19,10 +18,14 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::vec;
 
 /// Messages outside of chunks make stretches of this length.
 const STRETCH_BYTES: u64 = 1 << 20;
+/// So much is handed over at once, unless one message is longer, and so often ahead.
+const BATCH_BYTES: usize = 1 << 20;
+const BATCHES_AHEAD: usize = 2;
 
 /// A part of the file, and the times of its messages.
 #[derive(Clone, Copy)]
@@ -43,6 +46,15 @@ pub(crate) struct TimePlan {
     /// What is wrong with the file first.
     damage: Option<(u64, Damage)>,
     held_bytes_max: usize,
+}
+
+/// Messages that follow each other in time.
+#[derive(Default)]
+pub(crate) struct OrderedBatch {
+    pub(crate) data: Vec<u8>,
+    pub(crate) found: VecDeque<Found>,
+    /// So many bytes of the file are read.
+    pub(crate) read_bytes: u64,
 }
 
 impl TimePlan {
@@ -98,10 +110,30 @@ impl TimePlan {
         Ok(Self::new(contents.definitions().clone(), stretches, is_closed, damage))
     }
 
-    /// Messages from a time on.
-    pub(crate) fn read(&self, path: &Path, from_ns: u64) -> Result<ReadAhead, ReadError> {
+    pub(crate) fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// Messages from a time on, read by a thread that ends with its receiver.
+    pub(crate) fn read(
+        &self,
+        path: &Path,
+        from_ns: u64,
+    ) -> Result<Receiver<Result<OrderedBatch, ReadError>>, ReadError> {
         let mut ordered = Ordered::new(self.clone(), Frames::open(path)?, from_ns);
-        ReadAhead::start(path, move |batch| ordered.fill(batch))
+        let (batches, receiver) = sync_channel(BATCHES_AHEAD);
+        let read = move || {
+            loop {
+                let told = ordered.batch();
+                let is_last = told.as_ref().map_or(true, |batch| batch.found.is_empty());
+                if batches.send(told).is_err() || is_last {
+                    return;
+                }
+            }
+        };
+        let thread = std::thread::Builder::new().name("reading in order".into()).spawn(read);
+        thread.map_err(|error| ReadError::Io { path: crate::Shown(path.to_owned()), error })?;
+        Ok(receiver)
     }
 }
 
@@ -127,15 +159,17 @@ struct Ordered {
     read_bytes: u64,
     from_ns: u64,
     damage: Option<(u64, Damage)>,
-    is_closed: bool,
-    /// What was wrong is told.
-    is_over: bool,
 }
 
 /// Messages of a stretch, sorted.
 struct HeldStretch {
     data: Vec<u8>,
     found: VecDeque<Found>,
+}
+
+/// What so many messages with these data take; they need not have any.
+fn memory(data: &[u8], messages: usize) -> usize {
+    data.len() + messages * size_of::<Found>()
 }
 
 impl HeldStretch {
@@ -159,30 +193,13 @@ impl Ordered {
             read_bytes: 0,
             from_ns,
             damage: plan.damage,
-            is_closed: plan.is_closed,
-            is_over: false,
         }
     }
 
     /// The next messages; none at the end. What is wrong with the file is told behind its last message.
-    fn fill(&mut self, batch: &mut MessageBatch) {
-        (batch.read_bytes, batch.is_closed) = (self.read_bytes, self.is_closed);
-        if self.is_over {
-            return;
-        }
-        let told = self.take(batch).and_then(|()| match self.damage.take_if(|_| batch.found.is_empty()) {
-            Some((at, what)) => Err(self.contents.damaged(at, what)),
-            None => Ok(()),
-        });
-        if let Err(error) = told {
-            batch.fail(error);
-            self.is_over = true;
-        }
-        batch.read_bytes = self.read_bytes;
-    }
-
-    fn take(&mut self, batch: &mut MessageBatch) -> Result<(), ReadError> {
-        while !batch.is_full() {
+    fn batch(&mut self) -> Result<OrderedBatch, ReadError> {
+        let mut batch = OrderedBatch::default();
+        while memory(&batch.data, batch.found.len()) < BATCH_BYTES {
             if let Some(next) = self.next.filter(|its| self.earliest_ns().is_none_or(|ns| its.first_ns <= ns)) {
                 self.hold(next)?;
                 self.next = self.stretches.next();
@@ -191,14 +208,21 @@ impl Ordered {
             let Some(Reverse((_, begins))) = self.earliest.pop() else { break };
             let Some(held) = self.held.get_mut(&begins) else { continue };
             if let Some(found) = held.found.pop_front() {
-                batch.push(&found, found.data_in(&held.data));
+                batch.found.push_back({
+                    let bytes = found.data_in(&held.data);
+                    found.copied(bytes, &mut batch.data)
+                });
             }
             match held.found.front() {
                 Some(next) => self.earliest.push(Reverse((next.header.log_time, begins))),
                 None => self.held_bytes -= self.held.remove(&begins).map_or(0, |its| its.memory()),
             }
         }
-        Ok(())
+        batch.read_bytes = self.read_bytes;
+        match self.damage.take_if(|_| batch.found.is_empty()) {
+            Some((at, what)) => Err(self.contents.damaged(at, what)),
+            None => Ok(batch),
+        }
     }
 
     fn earliest_ns(&self) -> Option<u64> {
@@ -214,9 +238,7 @@ impl Ordered {
             match item {
                 Item::Message(its) if its.header.log_time >= self.from_ns => {
                     let bytes = self.contents.data(&its);
-                    if self.held_bytes + data.len() + (found.len() + 1) * size_of::<Found>() + bytes.len()
-                        > self.held_bytes_max
-                    {
+                    if self.held_bytes + memory(&data, found.len() + 1) + bytes.len() > self.held_bytes_max {
                         return Err(self.contents.too_much(FileLimit::Disorder));
                     }
                     found.push(its.copied(bytes, &mut data));
@@ -241,7 +263,6 @@ impl Ordered {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::read::ahead::BATCH_BYTES;
     use mcap::WriteOptions;
     use mcap::records::MessageHeader;
 
@@ -269,14 +290,14 @@ mod tests {
 
     /// When messages come, and what is told behind them.
     fn times(plan: &TimePlan, path: &Path) -> (Vec<u64>, Option<ReadError>) {
-        let (mut ahead, mut all) = (plan.read(path, 0).unwrap(), Vec::new());
-        loop {
-            match ahead.next() {
-                Ok(Some(found)) => all.push(found.header.log_time),
-                Ok(None) => return (all, None),
+        let mut all = Vec::new();
+        for told in plan.read(path, 0).unwrap() {
+            match told {
+                Ok(batch) => all.extend(batch.found.iter().map(|found| found.header.log_time)),
                 Err(error) => return (all, Some(error)),
             }
         }
+        (all, None)
     }
 
     #[test]
@@ -302,13 +323,8 @@ mod tests {
         const MESSAGES: usize = 3 * BATCH_BYTES / size_of::<Found>();
         let file = file_of(&[&[1; MESSAGES]], &[]);
         let mut plan = TimePlan::of(file.path()).unwrap();
-        let mut ordered = Ordered::new(plan.clone(), Frames::open(file.path()).unwrap(), 0);
-        let batch = || {
-            let mut batch = MessageBatch::default();
-            ordered.fill(&mut batch);
-            Some(batch.found.len()).filter(|count| *count > 0)
-        };
-        let batches: Vec<usize> = std::iter::from_fn(batch).collect();
+        let batches: Vec<usize> =
+            plan.read(file.path(), 0).unwrap().into_iter().map(|told| told.unwrap().found.len()).collect();
         assert_eq!(batches.iter().sum::<usize>(), MESSAGES);
         assert!(
             batches.iter().all(|count| count * size_of::<Found>() < BATCH_BYTES + size_of::<Found>()),

@@ -2,7 +2,8 @@
 
 use super::support::{Said, file_of, memory_folder, read, said};
 use crate::format::op;
-use crate::{Reader, Selection, cut, info, merge, recover};
+use crate::read::contents::{Contents, Item};
+use crate::{Selection, cut, info, merge, recover};
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -119,17 +120,20 @@ fn a_thread_that_reads_ahead_reads_the_same() {
     for between in [&[][..], &index] {
         let bytes = [mcap::MAGIC, &first, between, &[0; 20], &chunk(&message(2, &[]))].concat();
         std::fs::write(&path, bytes).unwrap();
-        for open in [Reader::open, Reader::to_play] {
-            let mut reader = open(&path).unwrap();
+        for is_ahead in [false, true] {
+            let mut contents = Contents::open(&path).unwrap();
+            if is_ahead {
+                contents.read_ahead().unwrap();
+            }
             let (mut numbers, mut damages) = (Vec::new(), 0);
-            loop {
-                match reader.next() {
-                    Ok(Some((_, message))) => numbers.push(message.sequence),
-                    Ok(None) => break,
-                    Err(_) => damages += 1,
+            while let Some(item) = contents.next().unwrap() {
+                match item {
+                    Item::Message(found) => numbers.push(found.header.sequence),
+                    Item::Damaged(..) => damages += 1,
+                    Item::Metadata(_) | Item::Attachment(_) => {}
                 }
             }
-            assert_eq!((numbers, damages), (vec![1, 2], 1), "{} bytes between", between.len());
+            assert_eq!((numbers, damages), (vec![1, 2], 1), "{} bytes between, {is_ahead}", between.len());
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::{Contents, Ending, Item};
 use crate::error::{Damage, ReadError};
 use crate::format::op;
+use crate::read::ahead::AheadRecord;
 use crate::read::attachment::Attachment;
 use crate::read::chunk;
 use crate::read::definitions::Untaken;
@@ -17,10 +18,13 @@ const REREAD_BYTES_MAX: u64 = 16 << 20;
 impl Contents {
     /// The next record of the file; none if it is nothing of its own.
     pub(super) fn next_outside(&mut self) -> Result<Option<Item>, ReadError> {
-        let begins = self.frames.at();
+        let (step, unpacked) = self.step()?;
+        let begins = self.begins;
         let behind_head = begins + HEAD_BYTES as u64;
-        self.begins = begins;
-        match self.frames.step()? {
+        if let Some(unpacked) = unpacked {
+            return Ok(self.enter_chunk(unpacked).err().map(|damage| Item::Damaged(begins, damage)));
+        }
+        match step {
             Step::Record(op) => {
                 let is_exact = chunk::is_exact(op, self.frames.body());
                 self.resume_at = if is_exact { self.frames.at() } else { behind_head };
@@ -65,6 +69,7 @@ impl Contents {
     fn go_on(&mut self, damage: Option<Damage>, ending: Ending) -> Result<Option<Item>, ReadError> {
         let (begins, resume_at) = (self.begins, self.resume_at);
         let damaged = |damage| Some(Item::Damaged(begins, damage));
+        self.ahead = None;
         if self.reads_again(resume_at) {
             self.ending = Some(Ending::Damaged);
             return Ok(damage.and_then(damaged));
@@ -87,6 +92,28 @@ impl Contents {
     fn reads_again(&mut self, from: u64) -> bool {
         self.reread = self.reread.saturating_add(self.frames.at().saturating_sub(from));
         self.reread > REREAD_BYTES_MAX.saturating_add(self.frames.len().saturating_mul(2))
+    }
+
+    /// What is next in the file, and whether it is a chunk that was unpacked or could not be.
+    fn step(&mut self) -> Result<(Step, Option<Result<(), Damage>>), ReadError> {
+        let Some(ahead) = &mut self.ahead else {
+            self.begins = self.frames.at();
+            return Ok((self.frames.step()?, None));
+        };
+        let Some(AheadRecord { begins, ends, resume_at, step, mut body, unpacked }) = ahead.next() else {
+            self.ahead = None;
+            self.frames.seek(self.frames.at())?;
+            return self.step();
+        };
+        self.begins = begins;
+        self.resume_at = resume_at.unwrap_or(self.resume_at);
+        self.frames.pass_to(ends);
+        match unpacked {
+            Some(_) => std::mem::swap(&mut self.records, &mut body),
+            None => self.frames.swap_body(&mut body),
+        }
+        ahead.give_back(body);
+        Ok((step?, unpacked))
     }
 
     fn record(&mut self, op: u8) -> Result<Option<Item>, ReadError> {
