@@ -167,7 +167,7 @@ impl<'d> Section<'d> {
         self.get(key).and_then(|item| read(&item)).unwrap_or(usual)
     }
 
-    /// The same of a whole number.
+    /// The whole number of a key, within this range; `usual` if there is none, or a wrong one.
     pub(crate) fn whole_or<T: Whole>(&self, key: &'static str, range: RangeInclusive<T>, usual: T) -> T {
         self.or(key, usual, |item| item.whole(range, usual))
     }

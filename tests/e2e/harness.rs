@@ -208,7 +208,7 @@ impl Place {
         (place, launch, robot)
     }
 
-    /// The same, without waiting until they are.
+    /// A place with a node on which these modules begin, without waiting until they are on.
     pub(crate) fn begun(modules: &[&str]) -> (Self, Running, Robot) {
         let place = Self::new();
         let config = place.config(modules);

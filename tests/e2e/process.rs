@@ -36,7 +36,7 @@ impl Said {
         self.err
     }
 
-    /// It ended well, and has printed these words.
+    /// Checks that the program ended well, and has printed these words.
     #[track_caller]
     pub(crate) fn ok_with<const N: usize>(self, words: [&str; N]) {
         assert!(self.code == Some(0) && self.err.is_empty(), "{self:#?}");
@@ -44,7 +44,7 @@ impl Said {
         assert_has(&self.out, words);
     }
 
-    /// It failed, and told its user these words.
+    /// Checks that the program failed, and told its user these words.
     #[track_caller]
     pub(crate) fn fails_with<const N: usize>(self, words: [&str; N]) {
         assert!(self.code == Some(1) && !self.err.contains("panicked"), "{self:#?}");

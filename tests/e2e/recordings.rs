@@ -40,7 +40,7 @@ pub(crate) fn messages<T>(file: &Path, mut read: impl FnMut(&RecordedChannel, &M
     made
 }
 
-/// The same of a file that may be one that is being written: of what is there so far.
+/// What is made of the messages that are there so far, of a file that may be one that is being written.
 pub(crate) fn messages_so_far<T>(
     file: &Path,
     mut read: impl FnMut(&RecordedChannel, &Message<'_>) -> Option<T>,

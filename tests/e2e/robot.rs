@@ -33,7 +33,7 @@ impl Robot {
         self.tool_if_there(timeout).unwrap_or_else(|| panic!("the node is gone: {}", self.node.path().display()))
     }
 
-    /// The same of a node that may end meanwhile: none when it is gone.
+    /// A tool on a node that may end meanwhile: none when it is gone.
     pub(crate) fn tool_if_there(&self, timeout: Duration) -> Option<ToolLink> {
         match ToolLink::join(&self.installation, &self.node, &self.node_name, timeout) {
             Err(ClientError::Node(NodeError::Io(_, error))) if error.kind() == ErrorKind::NotFound => None,

@@ -17,7 +17,7 @@ const GROUPS: [(&str, &[&str]); 8] = [
     ("Else", &["run", "router", "tcp-router", "tcp-client", "help"]),
 ];
 
-/// The same command line, with its subcommands in groups.
+/// A command line with its subcommands in groups.
 pub(crate) fn grouped(command: Command) -> Command {
     let template = format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}\nOptions:\n{{options}}{{after-help}}",

@@ -18,7 +18,7 @@ pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A node with its configuration; removed when dropped.
 pub struct Place {
-    /// Its configuration.
+    /// The configuration of the node.
     pub installation: Arc<Installation>,
     /// The node `main`.
     pub node: Arc<Node>,

@@ -78,8 +78,8 @@ impl Handshake {
         self.take(now_ns, head, opened, true, datagram)
     }
 
-    /// The same; of a peer with another digest no incarnation may begin. A challenge of it is answered, so that its
-    /// sender knows that this node lives, and by which configuration.
+    /// Takes a hello as [`Self::receive`] does. Of a peer with another digest no incarnation may begin; its challenge
+    /// is answered, so that it knows that this node lives, and by which configuration.
     pub(super) fn take(
         &mut self,
         now_ns: u64,

@@ -68,7 +68,7 @@ pub trait EndHost {
     /// not know how an error is encoded. `holder`: the client that it was for. False: it gets none.
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool;
 
-    /// Its replicas; none: it has none, and what comes of such is not counted.
+    /// Replicas of this end; none: it has none, and what comes of such is not counted.
     fn replicas(&mut self) -> Option<&mut LineReplicas> {
         None
     }

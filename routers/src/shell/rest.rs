@@ -1,8 +1,8 @@
 //! The thread that sends what is not real time: scheduled like the modules that it serves, below all real-time threads.
 //!
-//! It has a queue, sockets and a port of its own. It shares the wire's rate with real time, which goes first. A second
-//! thread receives at that port. So the kernel separates both kinds before any thread runs, and a flood of one takes no
-//! room or time from the other.
+//! This thread has a queue, sockets and a port of its own. The wire's rate is shared with real time, which goes first.
+//! A second thread receives at that port. So the kernel separates both kinds before any thread runs, and a flood of one
+//! takes no room or time from the other.
 
 use super::answers::{ErrorReplier, Faults};
 use super::handover::{BatchReceiver, BatchSender, Waited, handover};

@@ -84,7 +84,7 @@ impl Field {
         }
     }
 
-    /// The same, where no router needs to be heard.
+    /// Launches nodes of which no router needs to be heard.
     fn launch_deaf(&mut self, nodes: &[&'static str]) {
         self.network.launch_from(&self.config.clone(), nodes);
     }

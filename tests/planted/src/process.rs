@@ -21,7 +21,7 @@ pub fn is_made(mistake: &str) -> bool {
 pub enum Verdict {
     /// Whatever mistake was made, it does not show there.
     Passed,
-    /// It shows.
+    /// The mistake shows.
     Failed,
     /// The test is not there, or could not run.
     Unknown,

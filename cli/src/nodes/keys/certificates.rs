@@ -261,12 +261,12 @@ pub(super) const PUBLIC: u32 = 0o644;
 pub(super) struct Written {
     pub(super) path: PathBuf,
     pub(super) text: String,
-    /// Its permissions.
+    /// Permissions of the file.
     pub(super) mode: u32,
 }
 
 impl Written {
-    /// Its temporary name.
+    /// The temporary name of the file.
     fn beside(&self) -> PathBuf {
         let mut beside = self.path.clone().into_os_string();
         beside.push(".new");

@@ -30,7 +30,7 @@ impl Said {
         Message { arrival_ns, stamp_ns, epoch, sequence, data: &self.data }
     }
 
-    /// Its channel, which is added if it is not there.
+    /// The channel of the topic, which is added if it is not there.
     pub(super) fn channel(&self, writer: &mut Writer) -> ChannelId {
         let (name, item) = self.topic.split_once('/').unwrap();
         channel(writer, name, item)

@@ -62,7 +62,7 @@ pub struct ServerSettings {
 /// A connection, for people.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MemberSnapshot {
-    /// Its name; before its hello, where it comes from.
+    /// The name of the member; before its hello, where it comes from.
     pub name: String,
     /// Where it comes from; empty if only its socket's owner knows.
     pub peer: String,

@@ -9,7 +9,7 @@ use std::fmt::Write;
 #[derive(Clone)]
 pub(super) struct CType {
     pub(super) name: String,
-    /// Its functions take it by pointer; others by value, with this word in their names.
+    /// The word in names of functions that take it by value; none: they take it by pointer.
     word: Option<&'static str>,
     /// About how many bytes one has in memory.
     pub(super) size: u64,
