@@ -6,6 +6,7 @@ mod replay;
 mod router;
 mod slots;
 mod tcp;
+mod wormhole;
 
 pub use recorder::{ChannelPage, LostBy, RecordedMessages, Recorder, RecorderInterface, RecorderProxy, RecordingState};
 pub use replay::{Replay, ReplayInterface, ReplayPosition, ReplayProxy, ReplayRefusal};
@@ -19,6 +20,11 @@ pub use slots::{SlotState, SlotUse, TunnelState};
 pub use tcp::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondLink, BeyondNode, BeyondOutage,
     BeyondState, BeyondStream, BeyondStreams, BeyondTime, ClassPassed, Tcp, TcpInterface, TcpProxy,
+};
+
+pub use wormhole::{
+    CauseCount, ControlDriver, ControlMode, ControlRefusal, ControlState, Supervisor, SupervisorInterface,
+    SupervisorProxy,
 };
 
 use crate::interface;
@@ -36,6 +42,9 @@ pub enum DriveError {
     /// The hardware does not answer.
     #[error("the motor does not answer: {0}")]
     Hardware(String),
+    /// What stands between the caller and the motor does not let it through.
+    #[error("the command is refused: {0}")]
+    Refused(String),
 }
 
 /// Drives a robot in the plane.

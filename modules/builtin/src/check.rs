@@ -1,7 +1,7 @@
 //! What built-in modules would refuse of a configuration, told before anything runs. The crate `config` knows no
 //! modules, so it is here that both meet.
 
-use super::{Builtin, description};
+use super::{Builtin, description, wormhole};
 use rohrpost_config::{
     Document, GUI, Installation, Module, Problem, Program, RECORDER, REPLAY, RecordedItems, Show, nearest, size_text,
 };
@@ -23,6 +23,7 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
             problems.extend(unknown_streams(&document, module, name));
         }
     }
+    problems.extend(wormhole::problems(installation, &document));
     for show in &installation.gui.show {
         problems.extend(data_of(installation, show));
         problems.extend(far_stream_of(installation, show));

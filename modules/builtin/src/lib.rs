@@ -12,8 +12,10 @@ pub mod format;
 mod mapper;
 mod output;
 mod pilot;
+mod scans;
 mod settings;
 mod sim;
+mod wormhole;
 
 pub use check::{check, check_saved};
 
@@ -47,6 +49,7 @@ impl Builtin {
             "carmen" => Self::of::<carmen::Carmen>(),
             "mapper" => Self::of::<mapper::MapModule>(),
             "pilot" => Self::of::<pilot::PilotModule>(),
+            "wormhole" => Self::of::<wormhole::WormholeModule>(),
             "output" => Self::of::<output::OutputModule>(),
             _ => return None,
         })
@@ -63,7 +66,8 @@ pub fn run(name: &str, start: Start) -> Option<Result<(), StartError>> {
 
 /// The built-in module that is called so or offers the interface of a class; none if nothing is built in for it.
 pub fn of_class(class: &str) -> Option<&'static str> {
-    let all = ["sim", "carmen", "mapper", "pilot", "output", RECORDER, REPLAY, ROUTER, TCP_CLIENT, TCP_ROUTER];
+    let all =
+        ["sim", "carmen", "mapper", "pilot", "wormhole", "output", RECORDER, REPLAY, ROUTER, TCP_CLIENT, TCP_ROUTER];
     all.into_iter().find(|builtin| *builtin == class || description(builtin, class).is_some())
 }
 

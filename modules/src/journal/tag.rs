@@ -78,10 +78,14 @@ pub(crate) enum Tag {
     End,
     /// One more answer, behind all others since it is younger: what a reader missed, by cause.
     Missed,
+    /// And two more: the monotonic clock,
+    Monotonic,
+    /// and the command that is being run.
+    RunningCommand,
 }
 
 /// All kinds in the order of their codes, and what a module does there.
-const ALL: [(Tag, &str); 37] = [
+const ALL: [(Tag, &str); 39] = [
     (Tag::Begin, "begins"),
     (Tag::Event, "is called"),
     (Tag::Time, "reads the clock"),
@@ -119,6 +123,8 @@ const ALL: [(Tag, &str); 37] = [
     (Tag::Hole, "does what no journal sees"),
     (Tag::End, "ends"),
     (Tag::Missed, "asks which records it has missed"),
+    (Tag::Monotonic, "reads the monotonic clock"),
+    (Tag::RunningCommand, "asks for the command that it runs"),
 ];
 
 impl Tag {

@@ -60,6 +60,18 @@ impl ModuleClock {
         SystemTime { ns, epoch, error, age }
     }
 
+    /// The computer's monotonic clock, ns from some origin: for deadlines, which no step of system time moves.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::Context;
+    /// fn in_half_a_second_ns(context: &Context) -> u64 {
+    ///     context.clock().monotonic_ns() + 500_000_000
+    /// }
+    /// ```
+    pub fn monotonic_ns(&self) -> u64 {
+        self.journal.answer(Tag::Monotonic, Question::Plain, rohrpost_mailbox::monotonic_ns)
+    }
+
     /// What the node's time goes by; none without a time page.
     ///
     /// ```

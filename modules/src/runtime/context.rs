@@ -16,7 +16,8 @@ use super::error::ContextError;
 use super::follow::Followings;
 use super::newest::Newest;
 use super::refusals::Refusals;
-use super::schedule::Schedule;
+use super::running_command::RunningCommand;
+use super::schedule::{Schedule, WakeUp};
 use super::stream::{FollowedStreams, OwnStreams};
 use super::time_teller::TimeTeller;
 use crate::call::{Caller, Link};
@@ -87,6 +88,8 @@ pub struct Context {
     pub(super) takes_all_at_end: bool,
     /// When ticks and periods are due.
     pub(crate) schedule: Schedule,
+    /// The command of the module's own that is being run.
+    pub(super) running_command: RunningCommand,
     /// What does not work, as the module itself says; empty: all does.
     pub(super) complaint: String,
     scratch: Vec<u8>,
@@ -107,6 +110,7 @@ impl Context {
         let named: Vec<Principal> = endpoints.iter().flat_map(|endpoint| installation.callers(*endpoint)).collect();
         let subscriptions = Subscriptions::new(&named);
         let schedule = Schedule::new(&installation, clock.unseen());
+        let running_command = RunningCommand::new(journal.clone());
         Self {
             me,
             installation,
@@ -131,6 +135,7 @@ impl Context {
             outside: Vec::new(),
             takes_all_at_end: false,
             schedule,
+            running_command,
             complaint: String::new(),
             scratch: Vec::new(),
         }
@@ -244,6 +249,41 @@ impl Context {
     pub fn set_period(&mut self, period: Duration) {
         self.journal.asked(Tag::Ticking, Question::Period(nanoseconds(period)));
         self.schedule.set_period(period);
+    }
+
+    /// One more tick at a moment of the monotonic clock ([`ModuleClock::monotonic_ns`]): to keep, and to set wherever a
+    /// deadline becomes known.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::Context;
+    /// fn tick_in_a_second(context: &Context) {
+    ///     context.wake_up().at(Some(context.clock().monotonic_ns() + 1_000_000_000));
+    /// }
+    /// ```
+    pub fn wake_up(&self) -> WakeUp {
+        self.schedule.wake_up()
+    }
+
+    /// Who has sent the command that is being run: to keep, and to ask in the functions of an interface.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, RunningCommand};
+    /// struct Motor {
+    ///     command: RunningCommand,
+    /// }
+    ///
+    /// impl Motor {
+    ///     fn new(context: &Context) -> Self {
+    ///         Self { command: context.running_command() }
+    ///     }
+    ///
+    ///     fn drive(&mut self) -> bool {
+    ///         self.command.get().age_ns < 50_000_000
+    ///     }
+    /// }
+    /// ```
+    pub fn running_command(&self) -> RunningCommand {
+        self.running_command.clone()
     }
 
     /// Ticks, and periods of the data that it publishes, go by the computer's clock, also where time is simulated or

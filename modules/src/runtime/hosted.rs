@@ -37,6 +37,7 @@ impl<M: MadeModule> CommandHandler for Hosted<'_, M> {
             return self.common(call, reply);
         }
         self.life.require_on()?;
+        self.context.running_command.begin(call);
         self.function(call.number, call.arguments, reply)
     }
 

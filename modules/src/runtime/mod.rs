@@ -27,6 +27,7 @@ mod received;
 pub(crate) mod refusals;
 mod run;
 mod runner;
+mod running_command;
 pub(crate) mod schedule;
 pub(crate) mod server;
 pub(crate) mod start;
@@ -45,6 +46,8 @@ pub use follow::{BadRate, Rate, Subscription};
 pub use host::{ClientError, ToolLink, describe};
 pub use received::Received;
 pub use run::{exit, run, run_described, run_started, tell_exit};
+pub use running_command::{CommandFacts, RunningCommand};
+pub use schedule::WakeUp;
 pub use server::{read_arguments, write_result};
 pub use start::{Start, find_running, find_unusable, kept};
 pub use stream::{

@@ -176,7 +176,8 @@ impl<M: MadeModule> Running<M> {
         let (lease, delivery) = (context.subscriptions.lease_ns(), context.subscriptions.due_ns());
         let tick = context.schedule.tick_ns().filter(|_| self.is_on());
         let due = tick.into_iter().chain(delivery).min();
-        let other = [lease, context.journal.due_ns()].into_iter().flatten().min();
+        let wake_up = context.schedule.wake_up_ns().filter(|_| self.is_on());
+        let other = [lease, context.journal.due_ns(), wake_up].into_iter().flatten().min();
         let waits = [due.map(|ns| context.schedule.wait_ns(now_ns, ns)), other.map(|ns| ns.saturating_sub(now_ns))];
         waits.into_iter().flatten().min().map(|ns| Instant::now() + Duration::from_nanos(ns))
     }

@@ -11,6 +11,8 @@
 
 use rohrpost_config::{Installation, TimeSource};
 use rohrpost_mailbox::{SystemClock, monotonic_ns};
+use std::cell::Cell;
+use std::rc::Rc;
 use std::time::Duration;
 
 /// Where time is simulated or replayed, a module with something due looks at its clock again after so long: a change of
@@ -52,6 +54,20 @@ struct Ticks {
     due_ns: u64,
 }
 
+/// Asks for one tick at a moment. See [`super::Context::wake_up`].
+#[derive(Clone, Debug, Default)]
+pub struct WakeUp {
+    at_ns: Rc<Cell<Option<u64>>>,
+}
+
+impl WakeUp {
+    /// At this moment of the monotonic clock, ns, in place of the one asked for before; none: only the ticks of the
+    /// period. A moment of the past is now.
+    pub fn at(&self, monotonic_ns: Option<u64>) {
+        self.at_ns.set(monotonic_ns);
+    }
+}
+
 /// The clock of a module's ticks and periods, and its ticks.
 pub(crate) struct Schedule {
     /// The node's time, where it is simulated or replayed.
@@ -59,6 +75,7 @@ pub(crate) struct Schedule {
     /// Epoch and time that it said last.
     seen: (u64, u64),
     ticks: Option<Ticks>,
+    wake_up: WakeUp,
 }
 
 impl Schedule {
@@ -68,7 +85,7 @@ impl Schedule {
             TimeSource::Simulation { .. } | TimeSource::Log => Some(clock.clone()),
         };
         let seen = node.as_ref().map_or((0, 0), seen);
-        Self { node, seen, ticks: None }
+        Self { node, seen, ticks: None, wake_up: WakeUp::default() }
     }
 
     /// From now on periods are measured by the computer's clock, whatever the node's time does.
@@ -81,6 +98,24 @@ impl Schedule {
     pub(crate) fn set_period(&mut self, period: Duration) {
         let period_ns = period.clamp(PERIOD_MIN, PERIOD_MAX).as_nanos() as u64;
         self.ticks = Some(Ticks { period_ns, due_ns: self.moment().work_ns });
+    }
+
+    pub(crate) fn wake_up(&self) -> WakeUp {
+        self.wake_up.clone()
+    }
+
+    /// When one tick was asked for, monotonic ns.
+    pub(crate) fn wake_up_ns(&self) -> Option<u64> {
+        self.wake_up.at_ns.get()
+    }
+
+    /// Whether it is time for the one tick that was asked for; then it is over.
+    fn take_wake_up(&self, now: WorkMoment) -> bool {
+        let is_due = self.wake_up_ns().is_some_and(|at_ns| at_ns <= now.monotonic_ns);
+        if is_due {
+            self.wake_up.at(None);
+        }
+        is_due
     }
 
     /// The next tick is now.
@@ -122,7 +157,8 @@ impl Schedule {
     /// Whether it is time for a tick. Time must have passed the moment at which it is due: while time stands still
     /// there is none, whatever was switched on meanwhile.
     pub(crate) fn take_tick(&mut self, now: WorkMoment) -> bool {
-        let Some(ticks) = self.ticks.as_mut().filter(|ticks| ticks.due_ns < now.work_ns) else { return false };
+        let woken = self.take_wake_up(now);
+        let Some(ticks) = self.ticks.as_mut().filter(|ticks| ticks.due_ns < now.work_ns) else { return woken };
         // Ticks that were slept through are not made up for; the grid stays where it was.
         let passed = (now.work_ns - ticks.due_ns) / ticks.period_ns;
         ticks.due_ns = ticks.due_ns.saturating_add((passed + 1).saturating_mul(ticks.period_ns));

@@ -81,8 +81,8 @@ impl CommandServer {
             }
             Verdict::Run => {
                 self.reply.clear();
-                let CallEnvelope { interface: hash, incarnation, .. } = envelope;
-                let call = Command { number, head, hash, incarnation, arguments };
+                let CallEnvelope { interface: hash, incarnation, sequence, .. } = envelope;
+                let call = Command { number, head, hash, incarnation, sequence, age_ns: request.age_ns, arguments };
                 let error = match handler.run(&call, &mut self.reply) {
                     Ok(()) => false,
                     Err(fault) => {
@@ -182,6 +182,10 @@ pub struct Command<'a> {
     hash: u32,
     /// The caller's.
     pub(crate) incarnation: u32,
+    /// The caller's number of it.
+    pub(crate) sequence: u32,
+    /// How long ago it was sent first, ns.
+    pub(crate) age_ns: u64,
     /// Arguments: postcard of a tuple.
     pub arguments: &'a [u8],
 }

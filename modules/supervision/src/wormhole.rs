@@ -1,0 +1,374 @@
+//! Who has control, and until when: the seed's wormhole, with its defects mended (digest, section 1, [B1] to [B4]).
+//!
+//! ```text
+//!            a promise            the next one in time: control on
+//!  Disabled ───────────▶ Test ──────────────────────────────────▶ Active ──┐ each promise in time
+//!   ▲   ▲                 │                                        │  ▲─────┘
+//!   │   └─ deadline missed┘          deadline missed: control off  │
+//!   └──────────────────────────────────────────────────────────────┘   failures in a window ──▶ Failed, until a reset
+//! ```
+//!
+//! In each mode but `Active`, and while anybody holds a halt, no command is in effect: the robot brakes.
+//!
+//! Decided where the seed is silent: the wormhole starts disabled. The promise that ends `Test` is in effect. A deadline
+//! that is missed in `Test` counts as a failure, and the wait begins anew. The wait applies to the start of a restarted
+//! program, too. A deadline may come nearer by a later promise: a program may bind itself more, never less than it said
+//! last. A person's missed deadline stops the robot, and restarts nothing.
+
+use crate::window::{REMEMBERED, Window};
+use crate::{Command, Halts, Order, Promise, Refusal};
+
+/// Times and numbers of a wormhole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// No promise reaches further than this from its arrival, ns; a longer one is cut to it.
+    pub horizon_ns: u64,
+    /// After control was lost, the program has so long to promise again, ns (the seed's MAXWAIT).
+    pub wait_ns: u64,
+    /// A program that has failed more often than this without control in between is restarted.
+    pub failures_before_restart: u32,
+    /// So many failures and restarts in `window_ns` end in [`Mode::Failed`]; at most 16.
+    pub failures_max: u32,
+    /// See `failures_max`, ns.
+    pub window_ns: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            horizon_ns: 1_000_000_000,
+            wait_ns: 1_000_000_000,
+            failures_before_restart: 3,
+            failures_max: 10,
+            window_ns: 60_000_000_000,
+        }
+    }
+}
+
+/// Who has control.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// Nobody: the driver has not promised since control was lost.
+    #[default]
+    Disabled,
+    /// Nobody yet: the driver has promised once, and is to keep that.
+    Test,
+    /// The driver.
+    Active,
+    /// Nobody, until a person calls [`Wormhole::reset`].
+    Failed,
+}
+
+/// Whose promises count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Driver {
+    /// The robot's own program.
+    #[default]
+    Program,
+    /// A person at a joystick or screen.
+    Person,
+}
+
+/// What the driver is to be told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Control {
+    /// It has control from now on.
+    On,
+    /// It has lost control.
+    Off,
+}
+
+/// What came of a call, besides the command in effect.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[must_use = "the driver is told, and a program is restarted, by the caller"]
+pub struct Change {
+    /// The driver is told this.
+    pub control: Option<Control>,
+    /// This run of the program is to be restarted, if it is still the one that runs.
+    pub restart: Option<u32>,
+}
+
+/// The wait after control was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Wait {
+    until_ns: u64,
+    has_promised: bool,
+}
+
+/// What is known of one driver.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Seat {
+    last: Option<Order>,
+}
+
+/// See the module's head.
+///
+/// ```
+/// use rohrpost_supervision::{Command, Control, Driver, Order, Promise, Settings, Wormhole};
+/// let forward = Command { speed_m_s: 0.5, turn_rate_rad_s: 0.0 };
+/// let promise = |sequence| {
+///     Promise { order: Order { incarnation: 1, sequence }, duration_ns: 200, command: forward }
+/// };
+/// let mut wormhole = Wormhole::new(Settings::default());
+/// wormhole.set_sight(0, true);
+/// assert!(wormhole.promise(100, 0, Driver::Program, promise(1)).1.is_ok());
+/// assert_eq!(wormhole.in_effect(), None); // tried first
+/// let (change, _) = wormhole.promise(250, 0, Driver::Program, promise(2));
+/// assert_eq!((change.control, wormhole.in_effect()), (Some(Control::On), Some(forward)));
+/// assert_eq!(wormhole.due_ns(), Some(450));
+/// assert_eq!(wormhole.look(450).control, Some(Control::Off)); // no promise in time: it brakes
+/// assert_eq!(wormhole.in_effect(), None);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wormhole {
+    settings: Settings,
+    mode: Mode,
+    driver: Driver,
+    program: Seat,
+    person: Seat,
+    sees: bool,
+    /// Of the last promise taken, in `Test` and `Active`.
+    deadline_ns: u64,
+    command: Command,
+    failures: u32,
+    window: Window,
+    wait: Option<Wait>,
+    /// Who has stopped the robot.
+    pub halts: Halts,
+}
+
+impl Wormhole {
+    /// Disabled, and blind until told otherwise.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings,
+            mode: Mode::default(),
+            driver: Driver::default(),
+            program: Seat::default(),
+            person: Seat::default(),
+            sees: false,
+            deadline_ns: 0,
+            command: Command::STOP,
+            failures: 0,
+            window: Window::default(),
+            wait: None,
+            halts: Halts::default(),
+        }
+    }
+
+    /// Who has control.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Whose promises count.
+    pub fn driver(&self) -> Driver {
+        self.driver
+    }
+
+    /// Deadlines missed since control was gained last.
+    pub fn failures(&self) -> u32 {
+        self.failures
+    }
+
+    /// The command that the motor may be given, within the envelope; none: the robot is to brake.
+    pub fn in_effect(&self) -> Option<Command> {
+        (self.mode == Mode::Active && !self.halts.is_held()).then_some(self.command)
+    }
+
+    /// When to [`Wormhole::look`] again at the latest; none while nothing is waited for.
+    pub fn due_ns(&self) -> Option<u64> {
+        let deadline_ns = matches!(self.mode, Mode::Test | Mode::Active).then_some(self.deadline_ns);
+        let wait_ns = self.wait.map(|wait| wait.until_ns);
+        deadline_ns.into_iter().chain(wait_ns).min()
+    }
+
+    /// Takes a promise that came at `now_ns`. `age_ns`: at least so much of its duration is over, by what is known of
+    /// its way.
+    ///
+    /// The refusal is the caller's answer; the change holds in both cases, since time has passed.
+    pub fn promise(
+        &mut self,
+        now_ns: u64,
+        age_ns: u64,
+        driver: Driver,
+        promise: Promise,
+    ) -> (Change, Result<(), Refusal>) {
+        let passed = self.look(now_ns);
+        match self.admit(age_ns, driver, &promise) {
+            Ok(is_other_run) => {
+                let lost = if is_other_run { self.disable() } else { None };
+                let taken = self.take(now_ns, age_ns, &promise);
+                (Change { control: taken.or(lost).or(passed.control), ..passed }, Ok(()))
+            }
+            Err(refusal) => (passed, Err(refusal)),
+        }
+    }
+
+    /// Whether the promise is of another run than the last one; numbers are used up even if it is late or blind.
+    fn admit(&mut self, age_ns: u64, driver: Driver, promise: &Promise) -> Result<bool, Refusal> {
+        if !promise.command.is_finite() {
+            return Err(Refusal::NotFinite);
+        }
+        let seat = if driver == Driver::Program { &mut self.program } else { &mut self.person };
+        let last = seat.last;
+        last.map_or(Ok(()), |last| promise.order.against(last))?;
+        seat.last = Some(promise.order);
+        if self.mode == Mode::Failed {
+            return Err(Refusal::Failed);
+        }
+        if driver != self.driver {
+            return Err(Refusal::OtherDriver);
+        }
+        if promise.duration_ns.min(self.settings.horizon_ns) <= age_ns {
+            return Err(Refusal::Late);
+        }
+        if !self.sees {
+            return Err(Refusal::Blind);
+        }
+        Ok(last.is_some_and(|last| last.incarnation != promise.order.incarnation))
+    }
+
+    /// One step up, with a new deadline.
+    fn take(&mut self, now_ns: u64, age_ns: u64, promise: &Promise) -> Option<Control> {
+        self.command = promise.command;
+        self.deadline_ns = now_ns.saturating_add(promise.duration_ns.min(self.settings.horizon_ns) - age_ns);
+        match self.mode {
+            Mode::Active | Mode::Failed => None,
+            Mode::Disabled => {
+                self.mode = Mode::Test;
+                if let Some(wait) = &mut self.wait {
+                    wait.has_promised = true;
+                }
+                None
+            }
+            Mode::Test => {
+                self.mode = Mode::Active;
+                self.failures = 0;
+                self.wait = None;
+                Some(Control::On)
+            }
+        }
+    }
+
+    /// Lets time pass: deadlines that are over, waits that are over.
+    pub fn look(&mut self, now_ns: u64) -> Change {
+        let mut change = Change::default();
+        if matches!(self.mode, Mode::Test | Mode::Active) && now_ns >= self.deadline_ns {
+            change.control = self.fail(now_ns);
+        }
+        if let Some(wait) = self.wait.filter(|wait| now_ns >= wait.until_ns) {
+            self.wait = None;
+            if !wait.has_promised || self.failures > self.settings.failures_before_restart {
+                change.restart = self.restart(now_ns);
+            }
+        }
+        change
+    }
+
+    /// A deadline is missed.
+    fn fail(&mut self, now_ns: u64) -> Option<Control> {
+        let lost = self.disable();
+        if self.driver == Driver::Program {
+            self.failures = self.failures.saturating_add(1);
+            self.count(now_ns);
+            self.wait_anew(now_ns);
+        }
+        lost
+    }
+
+    fn restart(&mut self, now_ns: u64) -> Option<u32> {
+        self.count(now_ns);
+        if self.mode == Mode::Failed {
+            return None;
+        }
+        self.mode = Mode::Disabled;
+        self.failures = 0;
+        self.wait_anew(now_ns);
+        self.program.last.map(|last| last.incarnation)
+    }
+
+    /// Counts a failure or a restart; too many of them need a person.
+    fn count(&mut self, now_ns: u64) {
+        self.window.push(now_ns);
+        let most = (self.settings.failures_max as usize).min(REMEMBERED);
+        if self.window.count(now_ns, self.settings.window_ns) >= most {
+            self.mode = Mode::Failed;
+            self.wait = None;
+        }
+    }
+
+    fn wait_anew(&mut self, now_ns: u64) {
+        let until_ns = now_ns.saturating_add(self.settings.wait_ns);
+        self.wait = (self.mode != Mode::Failed).then_some(Wait { until_ns, has_promised: false });
+    }
+
+    /// Takes control away, without blame.
+    fn disable(&mut self) -> Option<Control> {
+        let had_control = self.mode == Mode::Active;
+        if self.mode != Mode::Failed {
+            self.mode = Mode::Disabled;
+        }
+        had_control.then_some(Control::Off)
+    }
+
+    /// Whether the robot sees. A robot that does not loses its driver, and tries it anew when it sees again; the program
+    /// is not blamed.
+    pub fn set_sight(&mut self, now_ns: u64, sees: bool) -> Change {
+        let passed = self.look(now_ns);
+        self.sees = sees;
+        let lost = if sees { None } else { self.stand_by() };
+        Change { control: lost.or(passed.control), ..passed }
+    }
+
+    /// From now on the promises of this driver count. The other one loses control without blame.
+    pub fn set_driver(&mut self, now_ns: u64, driver: Driver) -> Change {
+        let passed = self.look(now_ns);
+        if driver == self.driver {
+            return passed;
+        }
+        let lost = self.stand_by();
+        self.driver = driver;
+        Change { control: lost.or(passed.control), ..passed }
+    }
+
+    /// Disabled, and nothing is waited for.
+    fn stand_by(&mut self) -> Option<Control> {
+        self.wait = None;
+        self.disable()
+    }
+
+    /// Launch has begun another run of the program: whatever was to be restarted is gone.
+    pub fn program_began(&mut self, now_ns: u64, incarnation: u32) -> Change {
+        let passed = self.look(now_ns);
+        let order = Order { incarnation, sequence: 0 };
+        let is_known =
+            self.program.last.is_some_and(|last| last.incarnation == incarnation || order.against(last).is_err());
+        if is_known {
+            return passed;
+        }
+        self.program.last = Some(order);
+        if self.driver != Driver::Program {
+            return passed;
+        }
+        let lost = self.disable();
+        if self.wait.is_some() {
+            self.wait_anew(now_ns);
+        }
+        Change { control: lost.or(passed.control), restart: None }
+    }
+
+    /// A person has looked: failures are forgotten, and the driver may try again.
+    pub fn reset(&mut self) {
+        if self.mode == Mode::Failed {
+            self.mode = Mode::Disabled;
+        }
+        self.failures = 0;
+        self.window = Window::default();
+        self.wait = None;
+    }
+}
+
+#[cfg(test)]
+#[path = "wormhole_tests.rs"]
+mod tests;
