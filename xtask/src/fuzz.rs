@@ -15,8 +15,8 @@ const PACKAGE: &str = "rohrpost-fuzz";
 const FLAGS: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
     -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1";
-/// What nearly all inputs pass through is optimised, beside what the profile optimises. More would cost a short run more
-/// than it saves.
+/// What nearly all inputs pass through, besides what the profile optimises. More would cost a short run more than it
+/// saves.
 const OPTIMISED: [&str; 14] = [
     "libfuzzer-sys",
     "mcap",
