@@ -98,6 +98,7 @@ mod streams_described;
 mod streams_killed;
 mod stuck;
 mod subscribe;
+mod supervised;
 mod systems;
 mod takeover;
 mod terminal;

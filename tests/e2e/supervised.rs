@@ -1,0 +1,97 @@
+//! The wormhole between program and motor: whatever the program does, the robot brakes, and touches nothing.
+
+use crate::harness::{PATIENCE, Place, halt, repository, signal, wait};
+use crate::process::Running;
+use crate::robot::Robot;
+use nix::sys::signal::Signal;
+use rohrpost::interface::Interface;
+use rohrpost::interfaces::MotorInterface;
+use rohrpost::types::Twist;
+use rohrpost::wire::{append, from_bytes};
+use serde_json::Value;
+
+/// What the simulation says of a touch.
+const TOUCHED: &str = "drove against something";
+
+/// The demo's robot as `config/demo-supervised.toml` has it.
+fn supervised() -> (Place, Running, Robot) {
+    let place = Place::new();
+    place.copy("config/building.map");
+    let text = std::fs::read_to_string(repository("config/demo-supervised.toml")).unwrap();
+    let config = place.write("robot.toml", text);
+    let (launch, robot) = place.launched_from(&config);
+    (place, launch, robot)
+}
+
+fn control(place: &Place) -> Value {
+    place.say(&["call", "wormhole.0", "state", "--json"]).json()
+}
+
+fn wait_for(place: &Place, what: &str, is_so: impl Fn(&Value) -> bool) {
+    wait(what, || is_so(&control(place)).then_some(()));
+}
+
+/// The motor says so itself.
+fn wait_until_it_stands(robot: &Robot) {
+    let mut tool = robot.tool(PATIENCE);
+    wait("the robot stands", || {
+        let (_, twist): (u64, Twist) = robot.newest(&mut tool, "motor.1", MotorInterface::MOTION).ok()?;
+        (twist == Twist::default()).then_some(())
+    });
+    tool.close();
+}
+
+#[test]
+fn a_stopped_and_a_killed_program_lose_control_and_regain_it() {
+    let (place, mut launch, robot) = supervised();
+    wait_for(&place, "the pilot drives", |state| state["mode"] == "active");
+    halt(robot.pid("pilot.0"));
+    wait_for(&place, "the stopped pilot has lost control", |state| state["mode"] != "active");
+    wait_until_it_stands(&robot);
+    signal(robot.pid("pilot.0"), Signal::SIGCONT);
+    wait_for(&place, "it drives again", |state| state["mode"] == "active" && state["gained"].as_u64() >= Some(2));
+    let killed = robot.kill("pilot.0");
+    robot.wait_restarted("pilot.0", killed.pid);
+    wait_for(&place, "its next run drives", |state| state["mode"] == "active" && state["gained"].as_u64() >= Some(3));
+    let out = launch.stop();
+    assert!(!out.contains(TOUCHED) && out.contains("the driver has lost control; the robot brakes"), "{out}");
+    place.assert_empty();
+}
+
+#[test]
+fn a_person_halts_takes_over_and_drives_at_walls_and_nobody_goes_past_the_wormhole() {
+    let (place, mut launch, robot) = supervised();
+    wait_for(&place, "the pilot drives", |state| state["mode"] == "active");
+    place.say(&["call", "motor.1", "drive", "0.5", "0"]).fails_with(["may not command"]);
+    let mut person = robot.tool(PATIENCE);
+    let supervisor = rohrpost::interfaces::SupervisorInterface::hash();
+    let mut call = |name: &str, function: u16, arguments: &[u8]| {
+        let write = |body: &mut Vec<u8>| {
+            body.extend_from_slice(arguments);
+            Ok(())
+        };
+        person.call(robot.name(name), function, supervisor, write, |bytes| Ok(bytes.to_vec())).unwrap()
+    };
+    // halt(1), resume(): still held by nobody.
+    call("wormhole.0", 17, &[1]);
+    wait_until_it_stands(&robot);
+    assert_eq!(control(&place)["halted_by"].as_array().map(Vec::len), Some(1));
+    assert_eq!(from_bytes::<Vec<String>>(&call("wormhole.0", 18, &[])).unwrap(), [""; 0]);
+    // take_over(): full speed ahead, without a look.
+    call("wormhole.0", 20, &[]);
+    let mut ahead = Vec::new();
+    append(&mut ahead, &(500_u32, 0.7, 0.2)).unwrap();
+    wait("the envelope has something to do", || {
+        call("wormhole.0", 16, &ahead);
+        let causes = control(&place)["causes"].to_string();
+        (causes.contains("something is in the way")).then_some(())
+    });
+    // give_back()
+    call("wormhole.0", 21, &[]);
+    wait_for(&place, "the pilot drives again", |state| state["mode"] == "active" && state["driver"] == "program");
+    drop(call);
+    person.close();
+    let out = launch.stop();
+    assert!(!out.contains(TOUCHED), "{out}");
+    place.assert_empty();
+}
