@@ -1,5 +1,6 @@
 //! Explains an installation in words: the page that `rohrpost check` prints, readable at 100 columns.
 
+mod access;
 mod memory;
 mod record;
 mod slots;
@@ -264,6 +265,7 @@ impl Page<'_> {
         let callers =
             self.installation.modules.iter().filter(|other| module.names().any(|own| other.calls.contains(&own)));
         self.entry("called by", &self.names(callers.map(|caller| caller.name)));
+        self.access(module);
         if !module.settings.is_empty() {
             let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
             self.entry("settings", &settings.join(", "));

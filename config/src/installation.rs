@@ -1,6 +1,6 @@
 //! An installation as its file describes it, read and checked as a whole.
 
-use crate::access::Access;
+use crate::access::{Access, AccessRule};
 use crate::classes::ClassTable;
 use crate::exact::JOURNAL;
 use crate::flow::Flow;
@@ -52,8 +52,8 @@ pub struct Installation {
     pub time: TimeSource,
     /// What happens when the computer's clock was set since system time began.
     pub when_set: ClockSetPolicy,
-    /// Which classes may command which from other nodes.
-    pub access: Vec<Access>,
+    /// Which classes may command which, or which modules.
+    pub access: Access,
     /// What the output service keeps.
     pub output: Output,
     /// What the GUI draws.
@@ -140,8 +140,8 @@ impl Installation {
 
     /// The rule of `[access]` that forbids the owner of this name to command the other one, if there is one. Launch may
     /// command all on its node: it switches modules on and off, whatever the rules say.
-    pub fn access_against(&self, from: Name, to: Name) -> Option<&Access> {
-        let rule = self.access.iter().find(|access| access.refuses(from.class(), to.class()))?;
+    pub fn access_against(&self, from: Name, to: Name) -> Option<&AccessRule> {
+        let rule = self.access.against(from, to)?;
         let is_launch = |node: &Node| self.launch_of(node) == from.module() && self.node_of(to) == Some(&node.name);
         (!self.nodes.iter().any(is_launch)).then_some(rule)
     }

@@ -76,7 +76,7 @@ mod tdma;
 mod time;
 mod units;
 
-pub use access::Access;
+pub use access::{Access, AccessRule, ClassSet, Commanded};
 pub use calls::{DownwardCalls, Downwards};
 pub use classes::{ClassEntry, ClassTable, GUI, NameTextError, ROUTER, TCP, TOOL};
 pub use contents::{Contents, ContentsError};

@@ -97,7 +97,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let read = sections.into_iter().enumerate().filter_map(|(index, section)| context.read(section, index));
     let (mut modules, mut lines): (Vec<Module>, Vec<_>) = routers.into_iter().chain(read).unzip();
 
-    let access = Access::read_all(file.section("access", "[access]"), &classes);
+    let access = Access::read(file.section("access", "[access]"), &directory);
     let output = Output::read(file.section("output", "[output]"), &directory, &folder);
     let gui = Gui::read(file.section("gui", "[gui]"), &directory);
     let record = Recording::read(file.section("record", "[record]"), &directory, &folder);

@@ -192,6 +192,7 @@ fn digest_counts_what_must_be_equal_and_nothing_else() {
         ("stop-within = \"500 ms\"", "stop-within = \"0.5 s\"", true, true, "a spelling"),
         ("size = \"60 KiB\"", "size = \"50 KiB\"", true, true, "a node's own mailbox"),
         ("record = \"8 MiB\"", "record = \"6 MiB\"", true, true, "a node's own stream"),
+        ("laser = [\"mapper\"]", "laser = [\"mapper\", \"tool\"]", true, true, "what a node's own modules admit"),
         ("id = 150", "id = 151", false, false, "another priority, and with it other names"),
         ("10.0.0.2", "10.0.0.3", true, false, "another address"),
         ("tools = [16, 31]", "tools = [16, 32]", true, false, "other tool instances"),

@@ -159,6 +159,11 @@ fn what_a_file_means_can_be_read_by_programs() {
     assert_eq!(motor["mailboxes"]["commands"]["max_age_ms"], 300.0);
     assert_eq!((&motor["streams"]["scan"]["late_ms"], &motor["streams"]["image"]["keep"]), (&50.0.into(), &8.into()));
     assert_eq!(json["missing_programs"][0]["module"], "motor.0");
+    let access = serde_json::json!([
+        { "class": "laser", "module": null, "callers": ["mapper"] },
+        { "class": null, "module": "motor.0", "callers": ["mapper", "tool"] },
+    ]);
+    assert_eq!(installation["access"], access);
     let number = |module: &serde_json::Value| module["number"].as_u64().unwrap();
     let system = installation["system"]["id"].as_u64().unwrap();
     assert_eq!(number(motor), system << 24 | motor["priority"].as_u64().unwrap() << 16);

@@ -4,8 +4,8 @@
 
 use rohrpost::Name;
 use rohrpost_config::{
-    Downwards, Installation, Level, MailboxSpec, Module, Program, Reach, RecordedItems, Recording, RestartPolicy,
-    Sampling, Scheduling, Start, StreamSpec, TimeSource, bounds,
+    Commanded, Downwards, Installation, Level, MailboxSpec, Module, Program, Reach, RecordedItems, Recording,
+    RestartPolicy, Sampling, Scheduling, Start, StreamSpec, TimeSource, bounds,
 };
 use rohrpost_mailbox::LAYOUT_VERSION;
 use rohrpost_network::{Bound, FlowBound, Network, Tdma};
@@ -73,9 +73,13 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
             "sampling": replica.sampling.to_string(), "changed": replica.changed,
         })
     });
-    let access = installation.access.iter().map(|rule| {
-        let callers = rule.callers.iter().map(|class| classes.name(*class));
-        json!({ "class": classes.name(rule.class), "callers": callers.collect::<Vec<_>>() })
+    let access = installation.access.rules().iter().map(|rule| {
+        let (class, module) = match rule.commanded {
+            Commanded::Class(class) => (classes.name(class), None),
+            Commanded::Module(name) => (None, Some(text(name))),
+        };
+        let callers = classes.iter().filter(|entry| rule.callers.has(entry.class)).map(|entry| &entry.name);
+        json!({ "class": class, "module": module, "callers": callers.collect::<Vec<_>>() })
     });
     json!({
         "name": name,

@@ -10,17 +10,15 @@
 //! A function of what configuration says and of the package alone: no socket, no clock, no memory of what came before.
 //! What a receiver has asked for only the receiver knows: that data are of its subscription is looked at there.
 
-mod access;
 mod packet;
 
-pub use access::Access;
 pub use packet::Addresses;
 #[cfg(test)]
 pub(crate) use packet::tests::v4;
 
 use crate::frame::NodeIndex;
 use crate::{counts, session};
-use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER};
+use rohrpost_config::{Access, AccessRule, Installation, ROUTER, TCP, TCP_SERVER};
 use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
 use rohrpost_network::Tunnel;
 
@@ -34,7 +32,7 @@ pub(crate) const PACKET_PRIORITY: Priority = Priority(0);
 /// The part of configuration that admission needs. The default refuses nothing but what is wrong in itself.
 #[derive(Clone, Debug, Default)]
 pub struct Admission {
-    /// Which classes may command which.
+    /// Which classes may command which, or which modules: the receiving node sees to it.
     pub access: Access,
     /// Class of the routers of the LAN.
     pub router: Option<Class>,
@@ -71,7 +69,7 @@ pub enum NotAdmitted {
     RoutersOwn,
     /// It is no IP packet from the tunnel's address of the node that it came from to ours.
     BadPacket,
-    /// A command of a class that may not command this one.
+    /// A command of a class that may not command this module.
     NotAllowed,
 }
 
@@ -101,7 +99,7 @@ impl Admission {
     pub fn new(installation: &Installation, node: &str) -> Self {
         let tunnel = installation.tdma.as_ref().and_then(|tdma| tdma.tunnel);
         Self {
-            access: Access::new(&installation.access),
+            access: installation.access.clone(),
             router: installation.classes.id(ROUTER),
             tcp: installation.classes.id(TCP),
             tunnel: tunnel.zip(installation.lan_index(node)),
@@ -131,7 +129,14 @@ impl Admission {
         if self.is_across_systems(way, head) {
             return Err(NotAdmitted::RoutersOwn);
         }
-        if self.access.allows(head) { Ok(()) } else { Err(NotAdmitted::NotAllowed) }
+        if self.rule_against(head).is_none() { Ok(()) } else { Err(NotAdmitted::NotAllowed) }
+    }
+
+    /// The rule of `[access]` that keeps a package from its mailbox: a command, or what else takes up room in a mailbox
+    /// for commands.
+    pub(crate) fn rule_against(&self, head: &Head) -> Option<&AccessRule> {
+        let is_command = matches!(head.kind.kind(), Kind::Command(_)) || head.to.local() == local::COMMANDS;
+        if is_command { self.access.against(head.from, head.to) } else { None }
     }
 
     /// Whether a body is an IP packet from the tunnel's address of a node to ours.

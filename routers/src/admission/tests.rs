@@ -1,15 +1,23 @@
 use super::*;
-use rohrpost_config as config;
+use rohrpost_config::{ClassSet, Commanded};
 use std::net::Ipv4Addr;
 
 const ROUTER: Class = Class(250);
 const TCP: Class = Class(64);
 const TUNNEL_NET: Tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
 
-/// Admission of node 0, with a tunnel, where only class 100 may command class 200.
+/// Admission of node 0, with a tunnel, where only class 100 may command class 200, and only class 90 the module of
+/// instance 5 there.
 fn admission() -> Admission {
-    let rule = config::Access { class: Class(200), callers: vec![Class(100)], line: 7 };
-    Admission { access: Access::new(&[rule]), router: Some(ROUTER), tcp: Some(TCP), tunnel: Some((TUNNEL_NET, 0)) }
+    let rule = |commanded, caller, line| AccessRule { commanded, callers: ClassSet::from_iter([Class(caller)]), line };
+    let of_class = rule(Commanded::Class(Class(200)), 100, 7);
+    let of_module = rule(Commanded::Module(name(1, 200, 5, 0)), 90, 8);
+    Admission {
+        access: Access::new(vec![of_module, of_class]),
+        router: Some(ROUTER),
+        tcp: Some(TCP),
+        tunnel: Some((TUNNEL_NET, 0)),
+    }
 }
 
 fn name(system: u8, class: u8, instance: u8, local: u8) -> Name {
@@ -83,18 +91,33 @@ fn of_another_systems_routers_the_tcp_router_alone_is_for_all() {
 
 #[test]
 fn only_classes_that_are_listed_may_command_by_whichever_way() {
-    for (kind, from, local, is_admitted) in [
-        (Type::command(16), 100, 0, true),
-        (Type::command(16), 90, 0, false),
-        (Type::command(16), 90, 3, false),
-        (Type::data(1), 90, 0, false),
-        (Type::reply(16), 90, 0, false),
-        (Type::data(1), 90, 2, true),
-        (Type::reply(16), 90, 1, true),
+    let (command, reply, data) = (Type::command(16), Type::reply(16), Type::data(1));
+    let [any, of_module, neighbour, other] =
+        [(200, 0), (200, 5), (200, 6), (199, 5)].map(|(class, instance)| name(1, class, instance, local::COMMANDS));
+    for (kind, from, to, rule, why) in [
+        (command, 100, any, None, "its class is listed"),
+        (command, 90, any, Some(7), "its class is not"),
+        (command, 90, any.with_local(3), Some(7), "at no mailbox"),
+        (data, 90, any, Some(7), "data in the mailbox for commands"),
+        (reply, 90, any, Some(7), "replies there"),
+        (data, 90, any.with_local(local::DATA), None, "else data go to all"),
+        (reply, 90, any.with_local(local::REPLIES), None, "replies too"),
+        (command, 90, of_module, None, "it is listed for this module"),
+        (command, 100, of_module, Some(8), "the line of the class does not count there"),
+        (command, 100, of_module.with_local(3), Some(8), "at no mailbox"),
+        (data, 100, of_module, Some(8), "data in the mailbox for commands"),
+        (data, 100, of_module.with_local(local::DATA), None, "else data go to all"),
+        (command, 90, neighbour, Some(7), "nor that of the module for its neighbour"),
+        (command, 100, neighbour, None, "which takes what its class takes"),
+        (command, 90, other, None, "a class without a line takes all"),
+        (command, 100, other, None, "whatever the same instance of another does"),
     ] {
-        let (expected, to) = (if is_admitted { Ok(()) } else { Err(NotAdmitted::NotAllowed) }, name(1, 200, 0, local));
-        assert_eq!(validated(lan(1), kind, name(1, from, 1, 1), to), expected, "{kind:?} to {to}, by the LAN");
-        assert_eq!(validated(BEYOND, kind, name(2, from, 1, 1), to), expected, "{kind:?} to {to}, by the TCP router");
+        let expected = if rule.is_none() { Ok(()) } else { Err(NotAdmitted::NotAllowed) };
+        for (way, from) in [(lan(1), name(1, from, 1, 1)), (BEYOND, name(2, from, 1, 1))] {
+            assert_eq!(validated(way, kind, from, to), expected, "{way:?}: {why}");
+            let head = Head { to, from, kind, ..Head::default() };
+            assert_eq!(admission().rule_against(&head).map(|rule| rule.line), rule, "{way:?}: {why}");
+        }
     }
 }
 

@@ -102,7 +102,7 @@ impl ErrorReplier {
             PeerLinkState::Refused(mismatch) => Some(mismatch),
             _ => None,
         });
-        let rule = settings.admission.access.line(head.to.class()).filter(|_| cause == Cause::NotAllowed);
+        let rule = settings.admission.rule_against(head).filter(|_| cause == Cause::NotAllowed).map(|rule| rule.line);
         let node = if rule.is_some() { settings.nodes.get(usize::from(settings.own)) } else { node };
         let why = Undelivered { cause, node: node.map(|node| node.name.as_str()), rule, mismatch, takes_bytes };
         self.body.clear();

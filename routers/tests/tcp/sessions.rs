@@ -1,9 +1,9 @@
 //! What crosses, what a dead server costs, and which client holds up which.
 
 use crate::ground::{COMMON, Router, System, module, two, wait};
-use rohrpost_config as config;
+use rohrpost_config::{Access, AccessRule, ClassSet, Commanded};
 use rohrpost_mailbox::{ALL_SYSTEMS, Class, Head, Priority, Sender, Type};
-use rohrpost_routers::admission::{Access, Admission};
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::session::frame::{Carried, Range, Ranges, SessionHello, SessionMessage};
 use rohrpost_routers::tcp::{ClientLink, LinkState};
 use std::io::{Read, Write};
@@ -89,8 +89,9 @@ fn packages_cross_from_system_to_system_and_what_is_not_there_is_answered() {
 fn a_node_takes_commands_from_beyond_only_as_its_configuration_allows() {
     let server = Router::start();
     let mut one = System::new(1, "one", server.address);
-    let only_others = config::Access { class: module(2).class(), callers: vec![Class(101)], line: 12 };
-    let admission = Admission { access: Access::new(&[only_others]), ..Admission::default() };
+    let callers = ClassSet::from_iter([Class(101)]);
+    let only_others = AccessRule { commanded: Commanded::Module(module(2)), callers, line: 12 };
+    let admission = Admission { access: Access::new(vec![only_others]), ..Admission::default() };
     let mut two = System::guarded(2, "two", server.address, None, admission);
     one.wait_up();
     two.wait_up();

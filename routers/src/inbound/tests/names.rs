@@ -1,12 +1,12 @@
 //! Which node may send from which names, and which sender may command which receiver.
 
-use crate::admission::{Access, Admission, PACKET, v4};
+use crate::admission::{Admission, PACKET, v4};
 use crate::counts::Cause;
 use crate::frame::{Fragment, FrameHead, FrameKind};
 use crate::harness::{End, START, address, head, module};
 use crate::inbound::Envelope;
 use crate::link::PeerLinkState;
-use rohrpost_config::{self as config};
+use rohrpost_config::{Access, AccessRule, ClassSet, Commanded};
 use rohrpost_mailbox::{Class, Head, Name, Priority, Type, local};
 use rohrpost_network::{Security, Tunnel};
 use std::net::Ipv4Addr;
@@ -44,10 +44,11 @@ fn a_node_speaks_for_its_own_names_alone() {
 
 #[test]
 fn only_classes_that_are_listed_may_command_from_another_node() {
-    let rule = config::Access { class: Class(200), callers: vec![Class(60)], line: 7 };
+    let callers = ClassSet::from_iter([Class(60)]);
+    let rule = AccessRule { commanded: Commanded::Class(Class(200)), callers, line: 7 };
     let mut end = End::new(0, |settings| {
         settings.network.security = Security::Keys;
-        settings.admission.access = Access::new(&[rule]);
+        settings.admission.access = Access::new(vec![rule]);
     });
     let command = |to, from| Head { kind: Type::command(16), ..head(module(to, 0), module(from, 1), 60) };
     let data = head(module(200, 0).with_local(local::DATA), module(61, 1), 60);

@@ -122,7 +122,7 @@ impl Client {
         let is_our_name = self.ranges.iter().any(|range| range.has(head.from));
         admission.validate(ArrivalPath::Beyond { is_our_name }, head, carried.body).map_err(|why| {
             if why == NotAdmitted::NotAllowed {
-                host.not_allowed(admission.access.line(head.to.class()));
+                host.not_allowed(admission.rule_against(head).map(|rule| rule.line));
             }
             why.into()
         })

@@ -2,11 +2,11 @@
 
 use super::ground::Ground;
 use super::plan::{client_settings, module, ranges};
-use crate::admission::{Access, Admission, PACKET, TUNNEL};
+use crate::admission::{Admission, PACKET, TUNNEL};
 use crate::session::Cause;
 use crate::session::client::ClientSettings;
 use crate::session::frame::{Carried, SessionMessage};
-use rohrpost_config as config;
+use rohrpost_config::{Access, AccessRule, ClassSet, Commanded};
 use rohrpost_mailbox::{Class, Head, Name, Priority, Type, local};
 
 const ROUTER: Class = Class(103);
@@ -14,8 +14,9 @@ const BARRED: Class = Class(60);
 
 /// A client of system 2, in which only class 40 may command modules of class 60, joined to its server.
 fn guarded() -> Ground {
-    let rule = config::Access { class: BARRED, callers: vec![Class(40)], line: 12 };
-    let admission = Admission { access: Access::new(&[rule]), router: Some(ROUTER), ..Admission::default() };
+    let callers = ClassSet::from_iter([Class(40)]);
+    let rule = AccessRule { commanded: Commanded::Class(BARRED), callers, line: 12 };
+    let admission = Admission { access: Access::new(vec![rule]), router: Some(ROUTER), ..Admission::default() };
     Ground::new([(ClientSettings { admission, ..client_settings(1, 9) }, ranges(1))])
 }
 
