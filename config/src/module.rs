@@ -21,7 +21,7 @@ pub const RECORDER: &str = "logd";
 /// The built-in module that plays recordings.
 pub const REPLAY: &str = "replay";
 /// The modules that the `rohrpost` program itself contains.
-pub const BUILTINS: [&str; 7] = ["sim", "carmen", "mapper", "pilot", "output", RECORDER, REPLAY];
+pub const BUILTINS: [&str; 8] = ["sim", "carmen", "mapper", "pilot", "wormhole", "output", RECORDER, REPLAY];
 
 /// What runs as a module.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -194,8 +194,11 @@ fn tools_say_what_to_do_while_nothing_runs() {
     assert!(said.err.contains("--config FILE --name CLASS.INSTANCE"), "{said:?}");
     let said = place.say(&["run", "mop", "--config", config.to_str().unwrap(), "--name", "output.0"]);
     assert_eq!(said.code, Some(2), "{said:?}");
-    assert!(said.err.contains("'mop'") && said.err.contains("sim, carmen, mapper, pilot, output"), "{said:?}");
-    assert!(place.say(&["run", "--help"]).ok().contains("sim, carmen, mapper, pilot, output"));
+    assert!(
+        said.err.contains("'mop'") && said.err.contains("sim, carmen, mapper, pilot, wormhole, output"),
+        "{said:?}"
+    );
+    assert!(place.say(&["run", "--help"]).ok().contains("sim, carmen, mapper, pilot, wormhole, output"));
     place.assert_empty();
 }
 

@@ -12,14 +12,16 @@
 //! A command is safe if no point of the scan is nearer to the sector than outline and margin. So each point allows some
 //! reach, and the least of them allows some speed. Turning on the spot has no reach: a round robot always may.
 //!
-//! - A beam without reading, and a direction without a beam, is an obstacle at the margin around the robot. That ring is
-//!   free: each command before kept it free, and at the start those have who put the robot there.
+//! - A beam without reading, and a direction without a beam, is an obstacle that touches the robot. Beside the sector, 45°
+//!   and more off it, that obstacle is at the margin around the robot: a robot that has turned so far since its scan would
+//!   have seen it in its way before, or sees it with the next scan. At the start those leave that ring free who put the
+//!   robot there.
 //! - A point from which the robot drives away never keeps it from going.
 //! - What moves may come nearer by `others_m_s`, from the scan until the robot stands.
 
 use crate::motion::Bounds;
 use crate::{Command, Motion, Scan};
-use core::f64::consts::{FRAC_PI_2, PI, TAU};
+use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
 use libm::{ceil, copysign, fabs, sincos, sqrt};
 
 /// The robot, its brakes and its times. What is promised is as true as these are.
@@ -185,26 +187,41 @@ struct Sector {
 }
 
 impl Sector {
+    /// Whether a point lies in the sector's directions, or near to them.
+    fn is_in_the_way(&self, x_m: f64, y_m: f64) -> bool {
+        let near_m = IN_THE_WAY_COS * sqrt(x_m * x_m + y_m * y_m);
+        let is_near = |edge: &Direction| edge.x * x_m + edge.y * y_m > near_m;
+        is_near(&self.right) || is_near(&self.left) || self.contains(x_m, y_m)
+    }
+
+    fn contains(&self, x_m: f64, y_m: f64) -> bool {
+        let is_between = || {
+            self.right.x * y_m - self.right.y * x_m >= 0.0
+                && self.left.y * x_m - self.left.x * y_m >= 0.0
+                // Of a sector without width, the first two hold behind it, too.
+                && (self.right.x + self.left.x) * x_m + (self.right.y + self.left.y) * y_m > 0.0
+        };
+        self.is_wide || is_between()
+    }
+
     /// The reach at which a disc of `radius_m` that moves in the sector touches a point; infinite if never.
     fn contact_m(&self, x_m: f64, y_m: f64, radius_m: f64) -> f64 {
-        let left_of_right_edge = self.right.x * y_m - self.right.y * x_m;
-        let right_of_left_edge = self.left.y * x_m - self.left.x * y_m;
-        if self.is_wide || (left_of_right_edge >= 0.0 && right_of_left_edge >= 0.0) {
-            // Of a sector without width, this holds behind it, too.
-            let is_ahead =
-                self.is_wide || (self.right.x + self.left.x) * x_m + (self.right.y + self.left.y) * y_m > 0.0;
-            return if is_ahead { (sqrt(x_m * x_m + y_m * y_m) - radius_m).max(0.0) } else { f64::INFINITY };
+        if self.contains(x_m, y_m) {
+            return (sqrt(x_m * x_m + y_m * y_m) - radius_m).max(0.0);
         }
-        let along_edge = |edge: Direction, across_m: f64| {
-            let along_m = edge.x * x_m + edge.y * y_m;
+        let along_edge = |edge: &Direction| {
+            let (along_m, across_m) = (edge.x * x_m + edge.y * y_m, edge.x * y_m - edge.y * x_m);
             if along_m <= 0.0 || fabs(across_m) >= radius_m {
                 return f64::INFINITY;
             }
             (along_m - sqrt(radius_m * radius_m - across_m * across_m)).max(0.0)
         };
-        along_edge(self.right, left_of_right_edge).min(along_edge(self.left, right_of_left_edge))
+        along_edge(&self.right).min(along_edge(&self.left))
     }
 }
+
+/// Directions so near to the sector lie in the way.
+const IN_THE_WAY_COS: f64 = FRAC_1_SQRT_2;
 
 impl Envelope {
     /// Of a robot with its scanner.
@@ -289,7 +306,7 @@ impl Envelope {
         }
     }
 
-    /// The reach until the robot's body would leave, in a direction without reading, the ring that is known to be free.
+    /// The reach that a direction without reading allows.
     fn unseen_m(&self, beam: Direction, sector: &Sector, others_m: f64) -> f64 {
         let Limits { radius_m, margin_m, .. } = self.limits;
         let Mounting { x_m, y_m, .. } = self.mounting;
@@ -299,7 +316,7 @@ impl Envelope {
         let inside_m2 = ring_m * ring_m - (x_m * x_m + y_m * y_m) + along_m * along_m;
         let leaves_m = (sqrt(inside_m2.max(0.0)) - along_m).max(0.0);
         let (x_m, y_m) = (x_m + leaves_m * beam.x, y_m + leaves_m * beam.y);
-        sector.contact_m(x_m, y_m, radius_m + others_m)
+        if sector.is_in_the_way(x_m, y_m) { 0.0 } else { sector.contact_m(x_m, y_m, radius_m + others_m) }
     }
 }
 

@@ -51,62 +51,144 @@ impl Bounds {
     }
 }
 
+/// A command, and when the one after it was sent.
 #[derive(Clone, Copy, Debug)]
 struct Told {
     at_ns: u64,
-    /// How the robot moved then at most, this command included.
+    /// In effect until a lag after this; none: it is the last one.
+    replaced_ns: Option<u64>,
     bounds: Bounds,
-    command: Bounds,
 }
 
-/// What the motor was told. A motor obeys after its lag at the latest, and brakes at least as hard as promised; until
-/// then the robot may move as it was told before.
+/// What the motor was told. A motor obeys after its lag at the latest, and brakes at least as hard as promised. So each
+/// command bounds the motion until a lag after the next one was sent, and from then on less and less.
 #[derive(Clone, Debug)]
 pub struct Motion {
     lag_s: f64,
     braking_m_s2: f64,
     turn_braking_rad_s2: f64,
-    /// As a ring; `next` is the oldest.
+    /// As a ring; `next` is the oldest. At first what nobody knows: anything, until the first command.
     told: [Option<Told>; COMMANDS],
     next: usize,
-    /// What anything forgotten may have been.
+    /// What anything forgotten may have been, and when it was forgotten.
+    forgotten: (Bounds, u64),
     most: Bounds,
 }
 
 impl Motion {
     /// Nothing is known of before: the robot may have moved as fast as it can.
     pub fn new(lag_s: f64, braking_m_s2: f64, turn_braking_rad_s2: f64, most: Bounds) -> Self {
-        Self { lag_s, braking_m_s2, turn_braking_rad_s2, told: [None; COMMANDS], next: 0, most }
+        let mut told = [None; COMMANDS];
+        told[0] = Some(Told { at_ns: 0, replaced_ns: None, bounds: most });
+        let forgotten = (Bounds::default(), 0);
+        Self { lag_s, braking_m_s2, turn_braking_rad_s2, told, next: 1, forgotten, most }
     }
 
     /// The motor is told this now.
     pub fn tell(&mut self, now_ns: u64, command: Command) {
-        let command = Bounds::of(command);
-        let bounds = self.at(now_ns).with(command);
-        self.told[self.next] = Some(Told { at_ns: now_ns, bounds, command });
+        let last = (self.next + COMMANDS - 1) % COMMANDS;
+        if let Some(last) = &mut self.told[last] {
+            last.replaced_ns = Some(now_ns);
+        }
+        let told = Told { at_ns: now_ns, replaced_ns: None, bounds: Bounds::of(command) };
+        if let Some(oldest) = self.told[self.next].replace(told) {
+            let (bounds, since_ns) = self.forgotten;
+            let rest = self.braked(bounds, since_ns, now_ns).with(self.of(&oldest, now_ns));
+            self.forgotten = (rest, now_ns);
+        }
         self.next = (self.next + 1) % COMMANDS;
     }
 
     /// Bounds of the motion at a time, by what was told until then.
     pub fn at(&self, at_ns: u64) -> Bounds {
-        match self.newest_first().find(|told| told.at_ns <= at_ns) {
-            Some(told) => self.since(told, at_ns),
-            None => self.most,
+        self.bounds(at_ns, at_ns)
+    }
+
+    /// Bounds of all motion from then on, by all that was told.
+    pub fn from(&self, from_ns: u64) -> Bounds {
+        self.bounds(from_ns, u64::MAX)
+    }
+
+    /// Bounds from a time on, by what was told until another. No command bounds less than it did before.
+    fn bounds(&self, from_ns: u64, until_ns: u64) -> Bounds {
+        let (bounds, since_ns) = self.forgotten;
+        let rest = if from_ns < since_ns { self.most } else { self.braked(bounds, since_ns, from_ns) };
+        let told = self.told.iter().flatten().filter(|told| told.at_ns <= until_ns);
+        told.fold(rest, |all, told| all.with(self.of(told, from_ns.max(told.at_ns))))
+    }
+
+    /// What a command leaves of its motion at a time.
+    fn of(&self, told: &Told, at_ns: u64) -> Bounds {
+        match told.replaced_ns {
+            Some(replaced_ns) => self.braked(told.bounds, replaced_ns.saturating_add(self.lag_ns()), at_ns),
+            None => told.bounds,
         }
     }
 
-    /// Bounds of all motion from then on, until another command is obeyed.
-    pub fn from(&self, from_ns: u64) -> Bounds {
-        let later = self.newest_first().take_while(|told| told.at_ns > from_ns);
-        later.fold(self.at(from_ns), |bounds, told| bounds.with(told.bounds))
+    fn lag_ns(&self) -> u64 {
+        (self.lag_s * 1e9) as u64
     }
 
-    fn since(&self, told: &Told, at_ns: u64) -> Bounds {
-        let obeyed_for_s = at_ns.saturating_sub(told.at_ns) as f64 * 1e-9 - self.lag_s;
-        told.bounds.braked(obeyed_for_s.max(0.0), self.braking_m_s2, self.turn_braking_rad_s2).with(told.command)
+    fn braked(&self, bounds: Bounds, from_ns: u64, at_ns: u64) -> Bounds {
+        let for_s = at_ns.saturating_sub(from_ns) as f64 * 1e-9;
+        bounds.braked(for_s, self.braking_m_s2, self.turn_braking_rad_s2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+    const MOST: Bounds = Bounds { backward_m_s: -2.0, forward_m_s: 2.0, right_rad_s: -1.0, left_rad_s: 1.0 };
+
+    fn ahead(speed_m_s: f64) -> Command {
+        Command { speed_m_s, turn_rate_rad_s: 0.0 }
     }
 
-    fn newest_first(&self) -> impl Iterator<Item = &Told> {
-        (1..=COMMANDS).filter_map(move |back| self.told[(self.next + COMMANDS - back) % COMMANDS].as_ref())
+    /// Brakes with 1 m/s², after 50 ms.
+    fn motion() -> Motion {
+        Motion::new(0.05, 1.0, 4.0, MOST)
+    }
+
+    #[track_caller]
+    fn assert_forward(motion: &Motion, at_ms: u64, speed_m_s: f64) {
+        let bound = motion.at(at_ms * MS).forward_m_s;
+        assert!((bound - speed_m_s).abs() < 1e-9, "{bound} at {at_ms} ms");
+    }
+
+    #[test]
+    fn what_is_not_known_is_the_most_and_ends_by_braking_however_often_it_is_told_to_stand() {
+        let mut motion = motion();
+        assert_eq!(motion.at(0), MOST);
+        (0..60).for_each(|look| motion.tell(look * 40 * MS, Command::STOP));
+        assert_forward(&motion, 50, 2.0);
+        assert_forward(&motion, 1050, 1.0);
+        assert_eq!(motion.at(2050 * MS), Bounds::default());
+    }
+
+    #[test]
+    fn a_command_bounds_the_motion_until_a_lag_after_the_next_and_the_braking_from_there() {
+        let mut motion = motion();
+        motion.tell(0, Command::STOP);
+        motion.tell(10_000 * MS, ahead(1.0));
+        motion.tell(11_000 * MS, ahead(0.4));
+        for (at_ms, speed_m_s) in
+            [(9_999, 0.0), (10_000, 1.0), (11_050, 1.0), (11_250, 0.8), (11_650, 0.4), (20_000, 0.4)]
+        {
+            assert_forward(&motion, at_ms, speed_m_s);
+        }
+        assert!((motion.from(11_350 * MS).forward_m_s - 0.7).abs() < 1e-9);
+        assert!(motion.from(9_000 * MS).forward_m_s == 1.0, "all that was told since");
+    }
+
+    #[test]
+    fn what_is_forgotten_still_brakes_and_before_that_anything_may_have_been() {
+        let mut motion = motion();
+        motion.tell(0, Command::STOP);
+        motion.tell(10_000 * MS, ahead(1.5));
+        (1..=80).for_each(|look| motion.tell((10_000 + look * 10) * MS, Command::STOP));
+        assert_forward(&motion, 10_810, 1.5 - 0.75);
+        assert_eq!(motion.from(10_000 * MS), MOST);
     }
 }

@@ -196,7 +196,7 @@ fn seen(taken_ns: u64, scan: &LaserScan) -> Scan<'_> {
 }
 
 fn worlds() -> u64 {
-    std::env::var("ROHRPOST_ENVELOPE_WORLDS").ok().and_then(|count| count.parse().ok()).unwrap_or(200)
+    std::env::var("ROHRPOST_ENVELOPE_WORLDS").ok().and_then(|count| count.parse().ok()).unwrap_or(100)
 }
 
 #[test]
@@ -209,8 +209,8 @@ fn nothing_is_touched_whatever_is_commanded_and_without_the_envelope_it_is() {
         sum.changed += outcome.changed;
         sum.way_m += outcome.way_m;
     }
-    let bare = (0..worlds().min(200)).filter(|seed| Trial::new(*seed, false).run().bumps > 0).count() as u64;
-    assert!(bare * 2 > worlds().min(200), "without the envelope only {bare} worlds were touched");
+    let bare = (0..worlds().min(100)).filter(|seed| Trial::new(*seed, false).run().bumps > 0).count() as u64;
+    assert!(bare * 2 > worlds().min(100), "without the envelope only {bare} worlds were touched");
     assert!(sum.changed * 5 > sum.judged, "the envelope had too little to do: {sum:?}");
     assert!(sum.way_m > worlds() as f64, "the robot hardly drives: {sum:?}");
 }

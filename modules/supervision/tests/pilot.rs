@@ -8,7 +8,7 @@ use rohrpost_supervision::{Command, Envelope, Limits, Mounting, Scan, Verdict};
 use std::collections::BTreeSet;
 
 const TENTH_NS: u64 = 100_000_000;
-const SEEDS: u64 = 20;
+const SEEDS: u64 = 6;
 
 /// What a drive of three minutes came to.
 #[derive(Debug, Default)]
