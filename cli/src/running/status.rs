@@ -35,13 +35,18 @@ struct StatusRow {
     #[serde(flatten)]
     account: Account,
     #[serde(flatten)]
-    figures: Option<ModuleFigures>,
+    figures: Option<Figures>,
     /// Why there is no report.
     failure: Option<String>,
 }
 
+/// A module's own report, in JSON as [`ModuleFigures`].
+#[derive(Serialize)]
+struct Figures(#[serde(with = "ModuleFigures")] Status);
+
 /// What only the module itself knows.
 #[derive(Serialize)]
+#[serde(remote = "Status")]
 struct ModuleFigures {
     incarnation: u32,
     uptime_ms: u64,
@@ -52,24 +57,6 @@ struct ModuleFigures {
     output_suppressed: u64,
     output_level: Option<OutputLevel>,
     refused: Refused,
-}
-
-impl From<Status> for ModuleFigures {
-    fn from(status: Status) -> Self {
-        let Status { incarnation, uptime_ms, subscribers, missed, lost, .. } = status;
-        let Status { output_lost, output_suppressed, output_level, refused, .. } = status;
-        Self {
-            incarnation,
-            uptime_ms,
-            subscribers,
-            missed,
-            lost,
-            output_lost,
-            output_suppressed,
-            output_level,
-            refused,
-        }
-    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -110,7 +97,7 @@ fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silenc
         account => match silence.map_or_else(|| Ok(tool.status(name)), Err) {
             Ok(Ok(status)) => {
                 let account = Account::said(&status, account);
-                return StatusRow { module: text, node, account, figures: Some(status.into()), failure: None };
+                return StatusRow { module: text, node, account, figures: Some(Figures(status)), failure: None };
             }
             Ok(Err(error)) => (running.told(name, &error).to_string(), account),
             Err(silence) => (silence, account),
@@ -122,15 +109,15 @@ fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silenc
 
 fn print(lines: &[StatusRow]) -> String {
     let rows = lines.iter().map(|line| {
-        let figure = |of: fn(&ModuleFigures) -> String| line.figures.as_ref().map_or("-".into(), of);
+        let figure = |of: fn(&Status) -> String| line.figures.as_ref().map_or("-".into(), |figures| of(&figures.0));
         [
             line.module.clone(),
             line.account.state.to_string(),
-            figure(|figures| time(Duration::from_millis(figures.uptime_ms))),
+            figure(|status| time(Duration::from_millis(status.uptime_ms))),
             line.account.restarts.to_string(),
-            figure(|figures| figures.subscribers.to_string()),
-            figure(|figures| figures.missed.to_string()),
-            figure(|figures| figures.lost.to_string()),
+            figure(|status| status.subscribers.to_string()),
+            figure(|status| status.missed.to_string()),
+            figure(|status| status.lost.to_string()),
             plain::line(line.account.error.as_deref().unwrap_or_default()).into_owned(),
         ]
     });
