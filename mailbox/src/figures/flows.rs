@@ -20,7 +20,7 @@ const NAP: Duration = Duration::from_micros(100);
 
 /// Packages of one type that one participant sends from one name to one mailbox, or values of one kind that it
 /// publishes.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FlowInfo {
     /// The process that sends.
     pub pid: u32,

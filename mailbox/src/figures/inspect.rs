@@ -15,7 +15,7 @@ use std::io;
 use std::sync::atomic::Ordering;
 
 /// A mailbox seen from outside.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct MailboxInfo {
     /// Its name.
     pub name: Name,

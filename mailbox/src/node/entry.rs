@@ -71,7 +71,7 @@ const _: () = assert!(size_of::<Entry>() == 64 && offset_of!(Entry, joined_ns) =
 const _: () = assert!(offset_of!(Entry, errors) == 36 && offset_of!(Entry, mark) == 40);
 
 /// One participant, as the table has it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ParticipantInfo {
     /// The module it is, local id 0; [`Name::NONE`] for one without a name.
     pub module: Name,

@@ -20,7 +20,7 @@ use std::io;
 use std::sync::atomic::Ordering;
 
 /// A stream seen from outside.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct StreamInfo {
     /// Which stream.
     pub id: StreamId,

@@ -35,7 +35,7 @@ const BEGUN_MAX: usize = 8;
 const PRESENT_BYTES_MAX: usize = 1 << 20;
 
 /// Which stream: the mailbox of the module that writes it, and a number of that module's own.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 pub struct StreamId {
     /// The mailbox.
     pub name: Name,

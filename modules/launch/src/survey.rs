@@ -46,7 +46,7 @@ use rohrpost_mailbox::{
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Survey {
     /// The node's name.
     pub node: String,
@@ -65,7 +65,7 @@ pub struct Survey {
 }
 
 /// A module at one moment.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ModuleSurvey {
     /// Its node.
     pub node: String,
@@ -156,7 +156,7 @@ impl Survey {
             }
             Scope::Streams => {
                 let Self { node, at_ns, streams, .. } = self;
-                return Self { streams, ..Self::empty(node, at_ns) };
+                return Self { node, at_ns, streams, ..Self::default() };
             }
             Scope::Module(raw) => self.reduce_to(Name::from_raw(raw).module()),
         }
@@ -173,16 +173,11 @@ impl Survey {
         self.modules.retain(|module| module.name == name || module.aliases.contains(&name));
     }
 
-    fn empty(node: String, at_ns: u64) -> Self {
-        let (modules, mailboxes, streams) = (Vec::new(), Vec::new(), Vec::new());
-        Self { node, at_ns, modules, mailboxes, streams, classes: Vec::new(), flows: Vec::new() }
-    }
-
     /// Several nodes as one, in this order; of each node of `silent`, which do not answer, the modules that the
     /// configuration names. What routers delivered for nodes that answer is left out: it is among what these sent.
     pub fn joined(surveys: Vec<Self>, silent: &[&str], installation: &Installation) -> Self {
         let node = surveys.first().map(|first| first.node.clone()).unwrap_or_default();
-        let mut all = Self::empty(node, monotonic_ns());
+        let mut all = Self { node, at_ns: monotonic_ns(), ..Self::default() };
         for survey in surveys {
             let node = survey.node;
             all.modules.extend(survey.modules);
@@ -265,16 +260,9 @@ fn survey(
     let mut waited = Latency::default();
     classes().for_each(|class| waited.add(&class.latency));
     ModuleSurvey {
-        node: String::new(),
-        at_ns: None,
         name,
         aliases,
         process,
-        usage: None,
-        scheduling: None,
-        working: None,
-        child: None,
-        error: None,
         received: saturating_sum(classes().map(|class| class.received)),
         bytes_in: saturating_sum(classes().map(|class| class.body_bytes)),
         lost: saturating_sum(classes().map(ClassTraffic::lost_in_all)),
@@ -283,6 +271,7 @@ fn survey(
         sent: saturating_sum(flows.iter().filter(sends).map(|flow| flow.packages)),
         bytes_out: saturating_sum(flows.iter().filter(sends).map(|flow| flow.bytes)),
         depth: own.iter().fold(0, |depth, mailbox| depth.saturating_add(mailbox.depth)),
+        ..ModuleSurvey::default()
     }
 }
 

@@ -6,10 +6,11 @@ use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Whether packages reach another node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[serde(rename_all = "lowercase")] // in JSON; postcard knows numbers only
 pub enum LinkState {
     /// The router has just begun, and has heard nothing yet.
+    #[default]
     Unknown,
     /// It is heard, and hears this one.
     Alive,
@@ -71,7 +72,7 @@ pub struct LinkCounters {
 }
 
 /// Another node, as a router sees it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct PeerLink {
     /// Its name.
     pub node: String,
@@ -146,7 +147,7 @@ pub struct LevelWaiting {
 }
 
 /// A router's view of all other nodes, and what it did. Counts are since it began, and only grow.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Links {
     /// Its node.
     pub node: String,
@@ -259,7 +260,7 @@ pub struct FlowStates {
 /// How late packages of a declared flow were. Measured by the router that sends: from publishing to the arrival of the
 /// last bit at the other computer, the link's time reckoned as bounds have it; where there are no time slots, until the
 /// package is handed to the kernel.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct FlowState {
     /// The module that sends.
     pub from: String,

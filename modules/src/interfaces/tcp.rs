@@ -6,10 +6,11 @@ use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Whether packages go to the TCP router and come from it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[serde(rename_all = "lowercase")] // in JSON; postcard knows numbers only
 pub enum BeyondState {
     /// There is no connection.
+    #[default]
     Away,
     /// There is one, but the node's names are not registered.
     Joining,
@@ -63,7 +64,7 @@ impl BeyondOutage {
 }
 
 /// A node's client of the TCP router. Counts are since it began, and only grow.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct BeyondLink {
     /// The node.
     pub node: String,

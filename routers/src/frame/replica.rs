@@ -33,7 +33,7 @@ impl ReplicaFrame<'_> {
 }
 
 /// A part of a record; all but the last have one size, which both ends know.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct RecordPart<'a> {
     /// Place of the replica in the configuration, from 0.
     pub place: u16,

@@ -152,13 +152,11 @@ mod tests {
         let carried = |packages| Carried { packages, ..Carried::default() };
         PeerLink {
             node: name.into(),
-            address: "10.77.0.9".into(),
             state: LinkState::Alive,
-            why: String::new(),
-            heard_ms: Some(1),
             sent: carried(sent),
             received: carried(received),
             counters: LinkCounters { lost, ..LinkCounters::default() },
+            ..PeerLink::default()
         }
     }
 
@@ -167,18 +165,7 @@ mod tests {
     }
 
     fn with_peers(name: &str, classes: Vec<ClassCarried>, peers: Vec<PeerLink>) -> Links {
-        Links {
-            node: name.into(),
-            digest: 1,
-            uptime_ms: 1,
-            peers,
-            waiting: Vec::new(),
-            waiting_bytes: 0,
-            classes,
-            foreign: 0,
-            failures: Vec::new(),
-            rejections: Vec::new(),
-        }
+        Links { node: name.into(), peers, classes, ..Links::default() }
     }
 
     fn wrong(base: ClassCarried, desk: ClassCarried, lost: u64) -> Vec<String> {

@@ -115,22 +115,7 @@ mod tests {
 
     #[test]
     fn a_client_that_never_took_part_is_not_well() {
-        let link = |state| BeyondLink {
-            node: "desk".into(),
-            server: "192.168.7.1:7400".into(),
-            state,
-            why: String::new(),
-            reconnects: 0,
-            round_trip_ns: None,
-            time_error_ns: None,
-            time: None,
-            outages: 0,
-            outage: None,
-            waiting_bytes: 0,
-            unknown_parts: 0,
-            sent: Vec::new(),
-            received: Vec::new(),
-        };
+        let link = |state| BeyondLink { state, ..BeyondLink::default() };
         assert!(is_well(&[link(BeyondState::Up), link(BeyondState::Up)]));
         for state in [BeyondState::Away, BeyondState::Joining] {
             assert!(!is_well(&[link(BeyondState::Up), link(state)]), "{state:?}");

@@ -11,20 +11,14 @@ fn head(from: NodeIndex) -> FrameHead {
 
 pub(super) fn part(bytes: &[u8]) -> RecordPart<'_> {
     RecordPart {
-        place: 0,
-        generation: 0,
         description: crc32fast::hash(&words(1)),
         incarnation: 3,
         len: bytes.len() as u32,
-        offset: 0,
         sequence: 5,
         epoch: 1,
         stamp_ns: 100,
-        written_ns: 0,
-        error_ns: 0,
-        step: 0,
-        sampled: 0,
         bytes,
+        ..RecordPart::default()
     }
 }
 

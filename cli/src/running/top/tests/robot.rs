@@ -16,8 +16,8 @@ use rohrpost_config::Installation;
 use rohrpost_launch::survey::{ModuleSurvey, StreamSurvey, Survey, Usage, sum};
 use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{
-    Class, ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, Missed, ModuleState, OverflowPolicy, ParticipantInfo,
-    Shape, StreamId, StreamInfo, StreamShape, Type, local,
+    Class, ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, ModuleState, OverflowPolicy, ParticipantInfo, Shape,
+    StreamId, StreamInfo, Type, local,
 };
 use std::path::Path;
 use std::time::Duration;
@@ -183,11 +183,8 @@ fn module(installation: &Installation, at_ns: u64, counts: &Counts) -> ModuleSur
         pid: 14_700 + u32::from(name.class().0),
         incarnation: 7,
         state: Some(state),
-        complains: false,
-        errors: 0,
         restarts: u32::from(counts.module == "pilot.0"),
-        joined_ns: 0,
-        in_hand: None,
+        ..ParticipantInfo::default()
     });
     // Each waited 25 to 33 µs, and one of fifteen some milliseconds.
     let mut waited = Latency { max: Duration::from_millis(6), ..Latency::default() };
@@ -208,8 +205,6 @@ fn module(installation: &Installation, at_ns: u64, counts: &Counts) -> ModuleSur
             "motor.0" => Scheduling::Fifo(34),
             _ => Scheduling::Normal(0),
         }),
-        working: None,
-        child: None,
         error: (counts.state == Some(ModuleState::Error)).then(|| "no scan has come for 5 s".to_owned()),
         name,
         aliases: configured.aliases.clone(),
@@ -222,6 +217,7 @@ fn module(installation: &Installation, at_ns: u64, counts: &Counts) -> ModuleSur
         sent: counts.sent,
         bytes_out: counts.sent * 100,
         depth: counts.waiting,
+        ..ModuleSurvey::default()
     }
 }
 
@@ -239,29 +235,22 @@ fn mailbox(module: &ModuleSurvey) -> MailboxInfo {
         name: module.name.with_local(local::COMMANDS),
         shape: Shape { full, ..Shape::default() },
         owner: module.process.as_ref().map(|process| process.pid),
-        adoptions: 0,
         depth: module.depth,
         depth_max: module.depth + 1,
         sent: module.received + u64::from(module.depth),
         classes: vec![class],
+        ..MailboxInfo::default()
     }
 }
 
 fn stream(at_ns: u64, name: Name) -> StreamSurvey {
     let info = StreamInfo {
         id: StreamId { name, number: 1 },
-        shape: StreamShape::default(),
-        writer: None,
-        adoptions: 0,
         written: 220,
         refused: 1,
-        oldest: None,
-        newest: None,
         readers: 2,
-        reader_modules: Vec::new(),
-        holding: 0,
         sleeping: 1,
-        missed: Missed::default(),
+        ..StreamInfo::default()
     };
     StreamSurvey { node: "main".into(), at_ns, info }
 }
@@ -276,12 +265,9 @@ fn flow(module: &ModuleSurvey, to: Name, packages: u64) -> FlowInfo {
         kind: Type::command(16),
         packages,
         bytes: packages * 100,
-        refused: 0,
         first_ns: 1,
         last_ns: 2,
-        interval_squares_ns2: 0,
-        age_sum_ns: 0,
-        seconds: Vec::new(),
+        ..FlowInfo::default()
     }
 }
 

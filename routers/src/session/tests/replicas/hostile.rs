@@ -22,19 +22,14 @@ fn check() -> u32 {
 fn part(bytes: &[u8]) -> RecordPart<'_> {
     RecordPart {
         place: BACK as u16,
-        generation: 0,
         description: check(),
         incarnation: 1,
         len: LEN as u32,
-        offset: 0,
         sequence: 3,
         epoch: 1,
         stamp_ns: 5,
-        written_ns: 0,
-        error_ns: 0,
-        step: 0,
-        sampled: 0,
         bytes,
+        ..RecordPart::default()
     }
 }
 
