@@ -107,10 +107,11 @@ impl Context {
         let named: Vec<Principal> = endpoints.iter().flat_map(|endpoint| installation.callers(*endpoint)).collect();
         let subscriptions = Subscriptions::new(&named);
         let schedule = Schedule::new(&installation, clock.unseen());
+        let limits = installation.module(me).map(|module| module.call_limits.clone()).unwrap_or_default();
         Self {
             me,
             installation,
-            link: Caller::new(link, journal.clone()),
+            link: Caller::new(link, journal.clone(), limits),
             endpoints,
             served: Vec::new(),
             stood_in: Vec::new(),
