@@ -54,7 +54,7 @@ pub(crate) struct Calls {
     pub(crate) downwards: DownwardCalls,
     /// The names with a longest wait.
     pub(crate) limits: CallLimits,
-    /// The name for whose answer it may wait longest, and how long, as far as the file knows.
+    /// Which name it may wait for longest, and how long, as far as the file knows.
     pub(crate) longest: Option<(String, Duration)>,
 }
 

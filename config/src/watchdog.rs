@@ -44,8 +44,9 @@ impl Watchdog {
         if let Some((to, longest)) = calls.longest.as_ref().filter(|(_, longest)| limit <= *longest) {
             let (longest, half) = (duration_text(*longest), duration_text(limit / 2));
             return item.wrong(&format!(
-                "more than \"{longest}\", for which it may wait for an answer of `{to}`; or say in `calls` that it waits \
-                 less, `{{ to = \"{to}\", within = \"{half}\" }}`, or with `subscribes = true` that it only subscribes"
+                "more than \"{longest}\", for which it may wait for an answer of `{to}`; or say in `calls` that it \
+                 waits less, `{{ to = \"{to}\", within = \"{half}\" }}`, or with `subscribes = true` that it only \
+                 subscribes"
             ));
         }
         Some(Self { limit, grace: grace? })

@@ -8,7 +8,7 @@
 //!
 //! Launch may be late itself: it was stopped, or the computer slept or was busy. Then the module had no chance either.
 //! Three rules keep it from being blamed. Time by which a look is late is not counted. A look that is late by more than
-//! an eighth of the limit says nothing about the time since the look before, so none of that is counted; and it judges
+//! an eighth of the limit says nothing about the time since the look before, so none of that is counted; and it ends
 //! nobody: launch must run, and see the same, for another quarter of the limit. So of any stop of the computer at most
 //! a quarter of the limit counts as silence, and of a long one nothing. A launch that is so late at every look finds no
 //! hang: that limit is too short for its computer.
@@ -48,7 +48,7 @@ pub(super) struct Hang {
 
 /// What follows from a look.
 #[derive(PartialEq, Eq, Debug)]
-pub(super) enum Judgement {
+pub(super) enum Verdict {
     /// Nothing.
     Fine,
     /// It is to be woken: perhaps it sleeps beside waiting packages, since their sender was stopped before it rang.
@@ -89,7 +89,7 @@ impl SilenceWatch {
     }
 
     /// Takes what launch sees now.
-    pub(super) fn look(&mut self, look: Look, now_ns: u64) -> Judgement {
+    pub(super) fn look(&mut self, look: Look, now_ns: u64) -> Verdict {
         let quarter_ns = self.limit_ns / 4;
         let late_ns = now_ns.saturating_sub(self.look_at_ns);
         let is_late = late_ns > quarter_ns / 2;
@@ -97,7 +97,7 @@ impl SilenceWatch {
         (self.looked_ns, self.look_at_ns) = (now_ns, now_ns + quarter_ns);
         let Some(silence) = look.silence() else {
             self.suspicion = None;
-            return Judgement::Fine;
+            return Verdict::Fine;
         };
         let before = self.suspicion.filter(|before| before.silence == silence);
         let mut suspicion = before.unwrap_or_else(|| Suspicion::new(silence, now_ns));
@@ -105,17 +105,17 @@ impl SilenceWatch {
         if is_late {
             suspicion.seen_ns = now_ns;
         }
-        let judge_at_ns = (suspicion.counts_from_ns + self.limit_ns).max(suspicion.seen_ns + quarter_ns);
-        if now_ns >= judge_at_ns {
+        let due_ns = (suspicion.counts_from_ns + self.limit_ns).max(suspicion.seen_ns + quarter_ns);
+        if now_ns >= due_ns {
             self.suspicion = None;
             let lasts = Duration::from_nanos(now_ns.saturating_sub(suspicion.began_ns));
-            return Judgement::Hangs(Hang { silence, lasts });
+            return Verdict::Hangs(Hang { silence, lasts });
         }
-        self.look_at_ns = self.look_at_ns.min(judge_at_ns);
+        self.look_at_ns = self.look_at_ns.min(due_ns);
         self.suspicion = Some(suspicion);
         match silence {
-            Silence::Waiting(_) if before.is_some() => Judgement::Wake,
-            _ => Judgement::Fine,
+            Silence::Waiting(_) if before.is_some() => Verdict::Wake,
+            _ => Verdict::Fine,
         }
     }
 }
@@ -164,8 +164,8 @@ mod tests {
     }
 
     /// A watch that looks when it wants to, from time 1000 ms on, at a module that `shows` this at each moment (ms).
-    /// `delay`: by how much launch is late at a moment. When it judges until `end_ms`, and for how long the module was
-    /// silent then.
+    /// `delay`: by how much launch is late at a moment. When a hang is found until `end_ms`, and for how long the
+    /// module was silent then.
     fn hangs_at(end_ms: u64, shows: impl Fn(u64) -> Look, delay: impl Fn(u64) -> u64) -> Option<(u64, u64)> {
         let mut watch = SilenceWatch::new(LIMIT, 1000 * MS);
         loop {
@@ -174,7 +174,7 @@ mod tests {
             if now_ms > end_ms {
                 return None;
             }
-            if let Judgement::Hangs(Hang { lasts, .. }) = watch.look(shows(now_ms), now_ms * MS) {
+            if let Verdict::Hangs(Hang { lasts, .. }) = watch.look(shows(now_ms), now_ms * MS) {
                 return Some((now_ms, lasts.as_millis() as u64));
             }
         }
@@ -206,8 +206,8 @@ mod tests {
         for began in 1000..1200 {
             for shows in [stopped(), waiting(7)] {
                 let shows = |now| if now < began { Look::default() } else { shows };
-                let (judged, lasts) = hangs_at(5000, shows, ON_TIME).unwrap();
-                assert!((began + 100..=began + 125).contains(&judged) && lasts == 100, "{began}: {judged}, {lasts}");
+                let (found, lasts) = hangs_at(5000, shows, ON_TIME).unwrap();
+                assert!((began + 100..=began + 125).contains(&found) && lasts == 100, "{began}: {found}, {lasts}");
             }
         }
         let continued = |now| if now < 1090 { stopped() } else { turn(1080) };
@@ -220,9 +220,9 @@ mod tests {
         let (mut wakes, mut now_ns) = (0, 0);
         let hang = loop {
             match watch.look(waiting(7), now_ns) {
-                Judgement::Hangs(hang) => break hang,
-                Judgement::Wake => wakes += 1,
-                Judgement::Fine => {}
+                Verdict::Hangs(hang) => break hang,
+                Verdict::Wake => wakes += 1,
+                Verdict::Fine => {}
             }
             now_ns = watch.look_at_ns();
         };
@@ -238,8 +238,8 @@ mod tests {
                 let (awake, ends) = (asleep + stop, began + needs + stop);
                 let shows = |now| if (began..ends).contains(&now) { turn(began) } else { Look::default() };
                 let delay = |planned: u64| if planned > asleep { awake.saturating_sub(planned) } else { 0 };
-                let judged = hangs_at(ends + 1000, shows, delay);
-                assert_eq!(judged, None, "needs {needs} from {began} on, stands for {stop} from {asleep} on");
+                let found = hangs_at(ends + 1000, shows, delay);
+                assert_eq!(found, None, "needs {needs} from {began} on, stands for {stop} from {asleep} on");
             }
         }
     }
@@ -248,11 +248,11 @@ mod tests {
     fn a_hang_is_found_although_launch_is_late() {
         for late in [1, 24, 26, 60, 1000] {
             let shows = |now| if now < 1010 { Look::default() } else { turn(1010) };
-            let (judged, _) = hangs_at(5000, shows, |planned| if planned < 1100 { late } else { 0 }).unwrap();
-            assert!((1110..=1225 + late).contains(&judged), "late by {late} at first: {judged}");
+            let (found, _) = hangs_at(5000, shows, |planned| if planned < 1100 { late } else { 0 }).unwrap();
+            assert!((1110..=1225 + late).contains(&found), "late by {late} at first: {found}");
             let always = |planned| if planned % 2 == 0 { late } else { 0 };
-            let (judged, lasts) = hangs_at(60_000, shows, always).unwrap();
-            assert!(judged >= 1110 && lasts == judged - 1010, "late by {late} at times: {judged}, {lasts}");
+            let (found, lasts) = hangs_at(60_000, shows, always).unwrap();
+            assert!(found >= 1110 && lasts == found - 1010, "late by {late} at times: {found}, {lasts}");
         }
     }
 
@@ -260,9 +260,9 @@ mod tests {
     fn looks_between_those_that_are_planned_change_nothing() {
         let mut watch = SilenceWatch::new(LIMIT, 1000 * MS);
         for now in 1000..1110 {
-            assert_eq!(watch.look(turn(1010.min(now)), now * MS), Judgement::Fine, "{now}");
+            assert_eq!(watch.look(turn(1010.min(now)), now * MS), Verdict::Fine, "{now}");
         }
         let hang = Hang { silence: turn(1010).silence().unwrap(), lasts: LIMIT };
-        assert_eq!(watch.look(turn(1010), 1110 * MS), Judgement::Hangs(hang));
+        assert_eq!(watch.look(turn(1010), 1110 * MS), Verdict::Hangs(hang));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::ending::{ChildShutdown, EndCause};
 use super::{Child, Phase};
-use crate::launch::silence::{Hang, Judgement, Look, Silence};
+use crate::launch::silence::{Hang, Look, Silence, Verdict};
 use crate::survey::{Working, is_stopped};
 use rohrpost_mailbox::{ClassTraffic, Loss, MailboxInfo, Node, local, monotonic_ns, saturating_sum};
 use std::time::{Duration, Instant};
@@ -22,12 +22,12 @@ impl Child {
         }
         let look = self.look(node);
         match self.watch.as_mut()?.look(look, now_ns) {
-            Judgement::Fine => None,
-            Judgement::Wake => {
+            Verdict::Fine => None,
+            Verdict::Wake => {
                 node.announce_death();
                 None
             }
-            Judgement::Hangs(hang) => {
+            Verdict::Hangs(hang) => {
                 let cause = self.told(hang, look.is_stopped, node);
                 let grace = self.watchdog.map_or(Duration::ZERO, |watchdog| watchdog.grace);
                 self.process.iter_mut().for_each(|process| process.terminate(node));
