@@ -6,13 +6,30 @@ use crate::probe::{ProbingProxy, WORK};
 use nix::sys::signal::Signal;
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError};
-use std::path::PathBuf;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{ModuleState, Node, Participant, Shape, node_directory};
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Not a test: what launch starts. Run as a test it ends at once.
 #[test]
 fn module() {
     run_if_launched::<Spinner>();
+}
+
+/// Not a test: what launch starts. It joins as a module between two turns does, and takes nothing of what comes.
+#[test]
+fn deaf() {
+    let Ok(module) = std::env::var("ROHRPOST_MODULE") else { return };
+    let installation = Installation::load(Path::new(&std::env::var("ROHRPOST_CONFIG").unwrap())).unwrap();
+    let name = installation.classes.parse_module(&module).unwrap();
+    let node = Node::create(&node_directory(&installation.name, "main"), 0o700).unwrap();
+    let participant = Participant::join(&node, name).unwrap();
+    let _commands = participant.clone().receiver(name, Shape::default()).unwrap();
+    participant.set_state(ModuleState::Off);
+    loop {
+        std::thread::park();
+    }
 }
 
 #[derive(Deserialize)]
@@ -119,6 +136,19 @@ fn a_module_that_is_stopped_is_ended_and_counts_against_its_policy() {
     launch.wait_for(&format!("{how}; given up after 1 restarts within 60s"));
     launch.stop_failed();
     assert!(launch.out().contains(&format!("{how}; starts again in 1ms")), "{}", launch.out());
+}
+
+#[test]
+fn a_module_that_takes_nothing_of_what_waits_is_ended() {
+    let program = program("hung::deaf");
+    let keys = "watchdog = \"500 ms\"\nrestart = \"never\"";
+    let deaf = format!("[[module]]\nname = \"probe.0\"\nprogram = {program}\n{keys}\n");
+    let (_place, mut launch, robot) = Place::begun(&[&deaf, &probe("probe.1", "", "")]);
+    launch
+        .wait_for("took none of the packages that wait for it (its watchdog allows 500ms), and was killed by signal ");
+    until("the others go on", || robot.state("probe.1") == "on");
+    launch.stop_failed();
+    assert!(launch.err().contains("probe.0 failed for good: hung for "), "{}", launch.err());
 }
 
 #[test]
