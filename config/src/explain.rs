@@ -9,7 +9,7 @@ mod timeline;
 use crate::calls::Downwards;
 use crate::installation::Installation;
 use crate::mailbox::TRANSIT;
-use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start, TCP_CLIENT, TCP_ROUTER};
+use crate::module::{BUSY_AFTER, Module, Program, Start, TCP_CLIENT, TCP_ROUTER};
 use crate::node::{Node, Reach};
 use crate::output::LineFormat;
 use crate::saved::{SavedDocument, SavedValue};
@@ -250,7 +250,7 @@ impl Page<'_> {
         }
         self.entry("runs", &runs(module));
         self.entry("starts", &starts(module));
-        self.entry("when it ends", &restart(&module.restart));
+        self.entry("when it ends", &module.restart.to_string());
         let subscribes = |name: &Name| module.downwards.subscribes(*name);
         let (subscribed, called): (Vec<Name>, Vec<Name>) = module.calls.iter().partition(|name| subscribes(name));
         self.entry("calls", &self.names(called));
@@ -260,6 +260,9 @@ impl Page<'_> {
         for to in &module.calls {
             if let Some(Downwards::Although(why)) = module.downwards.why(*to) {
                 self.entry("although", &format!("{} is less important: {why}", self.name(*to)));
+            }
+            if let Some(limit) = module.call_limits.of(*to) {
+                self.entry("waits", &format!("for {} at most {}", self.name(*to), duration_text(limit)));
             }
         }
         let callers =
@@ -380,18 +383,11 @@ fn starts(module: &Module) -> String {
     if module.busy_after != BUSY_AFTER {
         let _ = write!(words, "; busy after {}", duration_text(module.busy_after));
     }
+    if let Some(watchdog) = module.watchdog {
+        let _ = write!(words, "; {watchdog}");
+    }
     if !module.spin.is_zero() {
         let _ = write!(words, "; spins for {}", duration_text(module.spin));
     }
     words
-}
-
-fn restart(restart: &Restart) -> String {
-    let (backoff, within) = (duration_text(restart.backoff), duration_text(restart.within));
-    let again = format!("starts again after {backoff}, at most {} times in {within}", restart.at_most);
-    match restart.policy {
-        RestartPolicy::Never => "stays ended".into(),
-        RestartPolicy::OnFailure => format!("{again}; stays ended when it meant to end"),
-        RestartPolicy::Always => again,
-    }
 }

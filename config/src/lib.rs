@@ -66,6 +66,7 @@ mod reader;
 mod record;
 mod replica;
 mod replicated;
+mod restart;
 mod saved;
 mod scheduling;
 mod settings;
@@ -75,9 +76,10 @@ mod tcp;
 mod tdma;
 mod time;
 mod units;
+mod watchdog;
 
 pub use access::{Access, AccessRule, ClassSet, Commanded};
-pub use calls::{DownwardCalls, Downwards};
+pub use calls::{CALL_TIMEOUT, CallLimits, DownwardCalls, Downwards};
 pub use classes::{ClassEntry, ClassTable, GUI, NameTextError, ROUTER, TCP, TOOL};
 pub use contents::{Contents, ContentsError};
 pub use digest::Digest;
@@ -89,9 +91,7 @@ pub use gui::{Gui, Show};
 pub use installation::Installation;
 pub use keys::{KEY_BYTES, Key, Keys, KeysError, open_secret};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX, TRANSIT};
-pub use module::{
-    BUILTINS, Module, Program, RECORDER, REPLAY, Restart, RestartPolicy, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER,
-};
+pub use module::{BUILTINS, Module, Program, RECORDER, REPLAY, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER};
 pub use node::{Node, Reach, System};
 pub use output::{Level, LineFormat, Output};
 pub use plan::{bounds, records_left};
@@ -100,6 +100,7 @@ pub use program::{MissingProgram, find_program};
 pub use reader::{is_word as is_class_name, nearest};
 pub use record::{RecordedItems, Recording, Sampling};
 pub use replica::{REPLICAS_MAX, Replica};
+pub use restart::{Restart, RestartPolicy};
 pub use rohrpost_mailbox::OverflowPolicy;
 pub use saved::{Saved, SavedDocument, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
@@ -110,6 +111,7 @@ pub use time::{ClockSetPolicy, TimeSource};
 pub use units::{
     UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,
 };
+pub use watchdog::Watchdog;
 
 #[doc = include_str!("../../docs/src/configuration.md")]
 pub mod manual {}

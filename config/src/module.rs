@@ -1,12 +1,14 @@
 //! Modules: what runs where, with which settings, and what happens when it ends.
 
-use crate::calls::{Calls, DownwardCalls};
+use crate::calls::{CallLimits, Calls, DownwardCalls};
 use crate::directory::Directory;
 use crate::mailbox::{MailboxLines, Mailboxes, TRANSIT, lines_at};
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
+use crate::restart::Restart;
 use crate::stream::StreamSpec;
 use crate::units::duration_text;
+use crate::watchdog::Watchdog;
 use rohrpost_mailbox::{Name, saturating_sum};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -51,41 +53,6 @@ pub enum Start {
     Off,
 }
 
-/// When an ended module is started again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RestartPolicy {
-    /// It stays ended.
-    Never,
-    /// When it failed: a signal, or an exit code that is not 0.
-    OnFailure,
-    /// However it ended.
-    Always,
-}
-
-/// When, how soon and how often a module is started again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Restart {
-    /// After which end.
-    pub policy: RestartPolicy,
-    /// Wait before it.
-    pub backoff: Duration,
-    /// Restarts within [`within`](Self::within) before launch gives the module up.
-    pub at_most: u32,
-    /// Time in which restarts are counted.
-    pub within: Duration,
-}
-
-impl Default for Restart {
-    fn default() -> Self {
-        Self {
-            policy: RestartPolicy::OnFailure,
-            backoff: Duration::from_millis(200),
-            at_most: 5,
-            within: Duration::from_secs(60),
-        }
-    }
-}
-
 /// One `[[module]]`.
 #[derive(Clone, Debug)]
 pub struct Module {
@@ -105,6 +72,8 @@ pub struct Module {
     pub calls: Vec<Name>,
     /// The members of [`calls`](Self::calls) that may have a less important class, and why.
     pub downwards: DownwardCalls,
+    /// How long it waits at most for an answer, where [`calls`](Self::calls) says so.
+    pub call_limits: CallLimits,
     /// Settings of its own; [`Document::settings_as`](crate::Document::settings_as) gives them a type.
     pub settings: toml::Table,
     /// State after launch.
@@ -117,6 +86,8 @@ pub struct Module {
     pub stop_within: Duration,
     /// Code of it that runs for this long without a return is reported: the module is busy.
     pub busy_after: Duration,
+    /// How long it may be silent before launch ends it; none: for ever.
+    pub watchdog: Option<Watchdog>,
     /// Busy wait for packages before it sleeps.
     pub spin: Duration,
     /// Its mailboxes.
@@ -157,12 +128,14 @@ impl Module {
             required: ![TCP_CLIENT, TCP_ROUTER].contains(&builtin),
             calls: Vec::new(),
             downwards: DownwardCalls::default(),
+            call_limits: CallLimits::default(),
             settings: toml::Table::new(),
             start: Start::On,
             restart,
             ready_within: READY_WITHIN,
             stop_within: crate::stopping::USUAL,
             busy_after: BUSY_AFTER,
+            watchdog: None,
             spin: Duration::ZERO,
             mailboxes: Mailboxes::default(),
             streams: BTreeMap::new(),
@@ -227,6 +200,7 @@ impl Context<'_> {
         let ready_within = section.or("ready-within", READY_WITHIN, |item| item.duration_above_zero("10 s"));
         let stop_within = section.get("stop-within").and_then(|item| item.duration_above_zero("2 s"));
         let busy_after = section.or("busy-after", BUSY_AFTER, |item| item.duration_above_zero("1 s"));
+        let watchdog = Watchdog::read(&section, &calls);
         let spin = section.or("spin", Duration::ZERO, spin);
         let boxes = section.section("mailbox", &format!("{what}, mailbox"));
         let (mailboxes, mailbox_lines) = Mailboxes::read(boxes, &what, section.line);
@@ -245,11 +219,13 @@ impl Context<'_> {
             required,
             calls: calls.names,
             downwards: calls.downwards,
+            call_limits: calls.limits,
             settings,
             start,
             restart,
             ready_within,
             busy_after,
+            watchdog,
             spin,
             mailboxes,
             streams,
@@ -375,26 +351,4 @@ fn settings(section: &Section<'_>) -> Option<toml::Table> {
         item.reader.report(line, format!("{}: settings: {}", section.what, error.message()));
     };
     settings.inspect_err(wrong).ok()
-}
-
-impl Restart {
-    fn read(item: &Item<'_>, what: &str) -> Self {
-        let mut restart = Self::default();
-        let words = [
-            ("never", RestartPolicy::Never),
-            ("on-failure", RestartPolicy::OnFailure),
-            ("always", RestartPolicy::Always),
-        ];
-        if !item.is_table() {
-            restart.policy = item.choice(&words).unwrap_or(restart.policy);
-            return restart;
-        }
-        let Some(section) = item.section(&format!("{what}, restart")) else { return restart };
-        restart.policy = section.or("policy", restart.policy, |item| item.choice(&words));
-        restart.backoff = section.or("backoff", restart.backoff, |item| item.duration("200 ms"));
-        restart.at_most = section.whole_or("at-most", 1..=1000, restart.at_most);
-        restart.within = section.or("within", restart.within, |item| item.duration_above_zero("60 s"));
-        section.finish();
-        restart
-    }
 }

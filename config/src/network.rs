@@ -5,9 +5,10 @@
 
 use crate::classes::{ClassTable, ROUTER};
 use crate::keys;
-use crate::module::{Lines, Module, Restart, RestartPolicy};
+use crate::module::{Lines, Module};
 use crate::node::Node;
 use crate::reader::Section;
+use crate::restart::{Restart, RestartPolicy};
 use crate::units::rate_text;
 use rohrpost_mailbox::Name;
 use rohrpost_network::{NODES_MAX, Network, PAYLOAD_MAX, Security, Tdma};

@@ -5,9 +5,10 @@
 //! none does, another installation runs it.
 
 use crate::classes::{ClassTable, TCP};
-use crate::module::{Lines, Module, Restart, RestartPolicy, TCP_CLIENT, TCP_ROUTER};
+use crate::module::{Lines, Module, TCP_CLIENT, TCP_ROUTER};
 use crate::node::{Node, Reach};
 use crate::reader::Section;
+use crate::restart::{Restart, RestartPolicy};
 use crate::scheduling::{Scheduling, SchedulingRule};
 use rohrpost_mailbox::{Name, Priority, local};
 use rohrpost_network::{NODES_MAX, Tdma, level};

@@ -2,7 +2,7 @@
 
 use rohrpost_config::{
     ClockSetPolicy, Installation, JOURNAL, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RecordedItems,
-    RestartPolicy, Sampling, Scheduling, Start, StreamSpec, TimeSource, explain,
+    RestartPolicy, Sampling, Scheduling, Start, StreamSpec, TimeSource, Watchdog, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
@@ -47,6 +47,12 @@ fn every_key_arrives() {
     assert_eq!((motor.restart.at_most, motor.restart.within), (3, Duration::from_secs(300)));
     assert_eq!((motor.ready_within, motor.stop_within), (Duration::from_secs(3), Duration::from_millis(500)));
     assert_eq!(motor.spin, Duration::from_micros(20));
+    let ms = Duration::from_millis;
+    assert_eq!(motor.watchdog, Some(Watchdog { limit: ms(1500), grace: ms(50) }));
+    let mapper = full.module(Name::new(7, 96, 0, 0)).unwrap();
+    assert_eq!(mapper.watchdog, Some(Watchdog { limit: ms(300), grace: Duration::ZERO }));
+    let limits = [150, 200].map(|class| mapper.call_limits.of(Name::new(7, class, 0, 0)));
+    assert_eq!(limits, [Some(ms(200)), None]);
     let commands = motor.mailboxes.commands;
     assert_eq!((commands.slots, commands.size, commands.full, commands.claims), (16, 200, OverflowPolicy::Reject, 2));
     assert_eq!(commands.max_age, Some(Duration::from_millis(300)));

@@ -157,7 +157,7 @@ fn routers_agree_on_what_is_on_the_wire() {
 
 #[test]
 fn routers_may_be_called_and_have_levels_of_output() {
-    let text = FULL.replace("calls = [\"laser.0\"]", "calls = [\"laser.0\", \"router.0\"]");
+    let text = FULL.replace("calls = [", "calls = [{ to = \"router.0\", subscribes = true }, ");
     let text = text.replace("\"laser.0\" = \"trace\"", "\"router.1\" = \"trace\"");
     let full = parse(&text);
     let mapper = full.module(full.classes.parse_module("mapper.0").unwrap()).unwrap();

@@ -1,6 +1,7 @@
 //! What the `interface` attribute makes of a trait: an interface that a module serves and proxies call.
 
 use crate::call::{CallError, Caller, Fault, Pending};
+use rohrpost_config::CALL_TIMEOUT;
 use rohrpost_mailbox::Name;
 use rohrpost_schema::{Data, Description};
 use std::marker::PhantomData;
@@ -148,11 +149,8 @@ pub struct ProxyCore {
 }
 
 impl ProxyCore {
-    /// A call is given up after a second unless the proxy says otherwise.
-    const TIMEOUT: Duration = Duration::from_secs(1);
-
     pub fn new(link: &Caller, module: Name, description: fn() -> Description) -> Self {
-        Self { link: link.clone(), module: module.module(), timeout: Self::TIMEOUT, description }
+        Self { link: link.clone(), module: module.module(), timeout: CALL_TIMEOUT, description }
     }
 
     /// Begins a call; the arguments are a tuple.

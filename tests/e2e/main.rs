@@ -33,6 +33,7 @@ mod harness;
 mod hopeless;
 mod hostile;
 mod hostile_texts;
+mod hung;
 mod interface;
 mod lan;
 mod lan_tools;

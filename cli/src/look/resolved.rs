@@ -108,7 +108,10 @@ fn module(installation: &Installation, module: &Module) -> Value {
     let calls = module.calls.iter().map(|to| {
         let why = module.downwards.why(*to);
         let although = if let Some(Downwards::Although(why)) = why { Some(why) } else { None };
-        json!({ "to": text(to), "although": although, "subscribes": module.downwards.subscribes(*to) })
+        json!({
+            "to": text(to), "although": although, "subscribes": module.downwards.subscribes(*to),
+            "within_ms": module.call_limits.of(*to).map(ms),
+        })
     });
     let runs = match &module.program {
         Program::Builtin(name) => json!({ "builtin": name }),
@@ -141,6 +144,7 @@ fn module(installation: &Installation, module: &Module) -> Value {
         },
         "ready_within_ms": ms(module.ready_within),
         "stop_within_ms": ms(module.stop_within),
+        "watchdog": module.watchdog.map(|it| json!({ "limit_ms": ms(it.limit), "grace_ms": ms(it.grace) })),
         "mailboxes": mailboxes.collect::<serde_json::Map<_, _>>(),
         "streams": streams.collect::<serde_json::Map<_, _>>(),
     })

@@ -364,7 +364,7 @@ fn are_here<'a>(node: &Node, mut processes: impl Iterator<Item = &'a Participant
 }
 
 /// Whether a process stands: the letter after its name, which may hold anything, says so.
-fn is_stopped(pid: u32) -> bool {
+pub(crate) fn is_stopped(pid: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
     stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with(['T', 't']))
 }

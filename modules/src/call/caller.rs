@@ -2,6 +2,7 @@
 
 use super::{CallError, Link, append};
 use crate::journal::{Blob, ModuleJournal, NotedCommand, NotedValue, Question, Tag, nanoseconds};
+use rohrpost_config::CallLimits;
 use rohrpost_mailbox::Name;
 use rohrpost_schema::Description;
 use serde::Serialize;
@@ -29,6 +30,8 @@ pub struct Caller(Rc<SharedLink>);
 struct SharedLink {
     link: RefCell<Link>,
     journal: ModuleJournal,
+    /// No proxy waits longer, whatever its program says.
+    limits: CallLimits,
     /// Arguments, on their way into a journal and a command.
     arguments: RefCell<Vec<u8>>,
 }
@@ -44,8 +47,8 @@ impl Deref for Caller {
 }
 
 impl Caller {
-    pub(crate) fn new(link: Link, journal: ModuleJournal) -> Self {
-        Self(Rc::new(SharedLink { link: RefCell::new(link), journal, arguments: RefCell::default() }))
+    pub(crate) fn new(link: Link, journal: ModuleJournal, limits: CallLimits) -> Self {
+        Self(Rc::new(SharedLink { link: RefCell::new(link), journal, limits, arguments: RefCell::default() }))
     }
 
     /// For the runtime's own work, which no module sees.
@@ -110,7 +113,8 @@ impl Caller {
         timeout: Duration,
         arguments: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
     ) -> Result<u32, CallError> {
-        let SharedLink { link, journal, arguments: bytes } = &*self.0;
+        let SharedLink { link, journal, limits, arguments: bytes } = &*self.0;
+        let timeout = limits.of(to).map_or(timeout, |limit| timeout.min(limit));
         if journal.is_none() {
             return link.borrow_mut().begin(to, function, interface, timeout, arguments);
         }
@@ -182,6 +186,6 @@ impl Caller {
 /// Without a journal.
 impl From<Link> for Caller {
     fn from(link: Link) -> Self {
-        Self::new(link, ModuleJournal::default())
+        Self::new(link, ModuleJournal::default(), CallLimits::default())
     }
 }

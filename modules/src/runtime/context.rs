@@ -111,10 +111,11 @@ impl Context {
         let subscriptions = Subscriptions::new(&named);
         let schedule = Schedule::new(&installation, clock.unseen());
         let running_command = RunningCommand::new(journal.clone());
+        let limits = installation.module(me).map(|module| module.call_limits.clone()).unwrap_or_default();
         Self {
             me,
             installation,
-            link: Caller::new(link, journal.clone()),
+            link: Caller::new(link, journal.clone(), limits),
             endpoints,
             served: Vec::new(),
             stood_in: Vec::new(),

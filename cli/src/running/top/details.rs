@@ -93,14 +93,21 @@ fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
             installation.modules.iter().filter(|other| module.names().any(|name| other.calls.contains(&name)));
         say("called by", names(callers.map(|other| other.name).collect()));
     }
-    let process = sample.survey.module(row.name).and_then(|module| module.process.as_ref());
-    if let Some(process) = process {
+    let surveyed = sample.survey.module(row.name);
+    if let Some(module) = surveyed
+        && let Some(process) = &module.process
+    {
         let since = Duration::from_secs_f64(row.uptime_s.unwrap_or(0.0));
         let restarts = match row.line.account.restarts {
             0 => String::new(),
             count => format!(", started again {count} times"),
         };
         say("process", format!("{}, for {}{restarts}, {}", process.pid, span(since), row.line.scheduling));
+        if let Some(watchdog) = installation.module(row.name).and_then(|module| module.watchdog) {
+            let lasts = process.in_hand.zip(module.at_ns).map(|(turn, at_ns)| turn.lasts(at_ns));
+            let turn = lasts.map(|lasts| format!("; in a turn for {lasts:.1?}"));
+            say("watchdog", format!("{watchdog}{}", turn.unwrap_or_default()));
+        }
         let percent = row.cpu_percent.map_or("-".into(), |percent| format!("{percent:.1}"));
         say(
             "takes",

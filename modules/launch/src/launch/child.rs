@@ -5,6 +5,7 @@ mod ended;
 mod ending;
 mod heard;
 mod process;
+mod watchdog;
 
 pub(super) use ending::Then;
 
@@ -13,11 +14,12 @@ use super::policy::{Policy, STEADY};
 use super::printed::Printed;
 use super::program::Program;
 use super::repeats::Repeats;
+use super::silence::SilenceWatch;
 use crate::launcher::{ChildState, Phase};
 use ending::ChildShutdown;
 use process::ModuleProcess;
-use rohrpost_config::{Installation, Module, Start};
-use rohrpost_mailbox::{ModuleState, Name, Node};
+use rohrpost_config::{Installation, Module, Start, Watchdog};
+use rohrpost_mailbox::{ModuleState, Name, Node, monotonic_ns};
 use rohrpost_modules::launch_support::Relay;
 use std::io;
 use std::process::ExitStatus;
@@ -91,6 +93,9 @@ pub(super) struct Child {
     /// How it ended, and what it had printed; empty if it never did.
     last_end: String,
     health: Health,
+    watchdog: Option<Watchdog>,
+    /// Of the present process, once it is ready.
+    watch: Option<SilenceWatch>,
     printed: Printed,
     /// Launch ends: nothing is started any more.
     last_incarnation: bool,
@@ -130,6 +135,8 @@ impl Child {
             restarts: 0,
             last_end: String::new(),
             health: Health::new(module.busy_after, Instant::now()),
+            watchdog: module.watchdog,
+            watch: None,
             printed: Printed::new(relay.voice(installation, module.name)),
             last_incarnation: false,
         }
@@ -226,12 +233,13 @@ impl Child {
             _ if self.has_left_mailboxes() => Some(LOOK_KEPT),
             Phase::Starting => Some(LOOK),
             // Its end comes with a signal.
-            Phase::Stopping => {
-                self.ending.as_ref()?.press_at(self.stop_within)?.checked_duration_since(now).or(Some(LOOK))
-            }
+            Phase::Stopping => self.ending.as_ref()?.press_at()?.checked_duration_since(now).or(Some(LOOK)),
             // Killed, since it did not get ready.
             Phase::Waiting if self.process.is_some() => Some(LOOK_KEPT),
-            Phase::Ready | Phase::Running => Some(self.health.look_at().saturating_duration_since(now)),
+            Phase::Ready | Phase::Running => {
+                let busy = self.health.look_at().saturating_duration_since(now);
+                Some(self.watchdog_looks_in().map_or(busy, |hang| hang.min(busy)))
+            }
             Phase::Waiting if !self.last_incarnation => Some(self.since.saturating_duration_since(now)),
             _ => None,
         }
@@ -296,7 +304,10 @@ impl Child {
             return self.ended(status, now);
         }
         match self.phase {
-            Phase::Starting if self.state_of(node).is_some_and(is_ready) => self.phase = Phase::Ready,
+            Phase::Starting if self.state_of(node).is_some_and(is_ready) => {
+                self.phase = Phase::Ready;
+                self.watch = self.watchdog.map(|watchdog| SilenceWatch::new(watchdog.limit, monotonic_ns()));
+            }
             Phase::Starting if now - self.since > self.ready_within => {
                 let within = self.ready_within;
                 self.process.iter().for_each(|process| process.kill(node));
@@ -306,7 +317,10 @@ impl Child {
             }
             Phase::Waiting if self.may_spawn(now) => return self.spawn(node, now),
             Phase::Stopping => return self.press(node, now),
-            Phase::Ready | Phase::Running => return self.note_busy(node, now),
+            Phase::Ready | Phase::Running => {
+                let note = self.end_if_it_hangs(node, now);
+                return if self.ending.is_some() { note } else { self.note_busy(node, now) };
+            }
             _ => {}
         }
         None

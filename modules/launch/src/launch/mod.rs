@@ -29,6 +29,7 @@ mod printed;
 mod program;
 mod repeats;
 mod serve;
+mod silence;
 mod start;
 mod time;
 

@@ -1,5 +1,6 @@
 //! What follows when a process has ended, and what is said about it.
 
+use super::ending::{ChildShutdown, EndCause};
 use super::{Child, Phase, ProcessEnd, cut};
 use crate::launch::policy::Next;
 use crate::launch::repeats::Tell;
@@ -18,22 +19,27 @@ impl Child {
             (None, Some(signal)) => format!("was killed by signal {signal}"),
             (None, None) => "ended".to_owned(),
         };
-        if let Some(ending) = self.ending.take() {
-            self.printed.pass_on(false);
-            return self.ended_as_told(&ending, &how, now);
-        }
+        let hang = match self.ending.take() {
+            Some(ChildShutdown { cause: EndCause::Told(then), killed, .. }) => {
+                self.printed.pass_on(false);
+                return self.ended_as_told(then, killed.is_some(), &how, now);
+            }
+            Some(ChildShutdown { cause: EndCause::Hang(hang), .. }) => Some(hang),
+            None => None,
+        };
         // Modules that wait for its work expect it to go on as configured; but what a person has switched off stays
         // off.
         self.turn_on &= self.configured_on;
         let printed = self.printed.below();
         // Started again, it would find the same configuration, and the same program.
-        let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
+        let misconfigured = hang.is_none() && status.code() == Some(i32::from(StartError::CONFIGURATION));
         let is_hopeless = misconfigured || !self.has_joined && cannot_begin(status, &self.printed.last());
-        let success = status.success();
+        let success = hang.is_none() && status.success();
         let next = if is_hopeless || self.last_incarnation { Next::Stay } else { self.policy.ended(success, now) };
-        let how = match is_hopeless {
-            true => format!("{how}; not started again, since that would end in the same way"),
-            false => how,
+        let how = match hang {
+            Some(hang) => format!("{hang}, and {how}"),
+            None if is_hopeless => format!("{how}; not started again, since that would end in the same way"),
+            None => how,
         };
         self.follow(next, &ProcessEnd { is_success: success, how: &how, errno: None, printed: &printed }, now)
     }

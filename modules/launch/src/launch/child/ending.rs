@@ -3,6 +3,7 @@
 use super::{Child, Phase, Repeats};
 use crate::launch::leftovers::KILL_TIME;
 use rohrpost_mailbox::Node;
+use rohrpost_modules::common::OutputLevel;
 use std::time::{Duration, Instant};
 
 /// What becomes of a module that is told to end.
@@ -16,33 +17,48 @@ pub(in crate::launch) enum Then {
     End,
 }
 
+/// Why a process is on its way to its end.
+pub(super) enum EndCause {
+    /// Somebody wants it so.
+    Told(Then),
+    /// It hangs, in these words. Its restart policy says what becomes of it.
+    Hang(String),
+}
+
 /// A process on its way to its end.
 pub(super) struct ChildShutdown {
-    then: Then,
+    pub(super) cause: EndCause,
     /// When it was told.
     since: Instant,
+    /// It is killed after this time.
+    within: Duration,
     /// When it was killed, since it did not obey.
-    killed: Option<Instant>,
+    pub(super) killed: Option<Instant>,
     /// Not even that helped.
     left_behind: bool,
 }
 
 impl ChildShutdown {
+    /// Of a process that was asked to end.
+    pub(super) fn begin(cause: EndCause, within: Duration, now: Instant) -> Self {
+        Self { cause, since: now, within, killed: None, left_behind: false }
+    }
+
     /// When there is something to do about it, if it has not ended by then.
-    pub(super) fn press_at(&self, stop_within: Duration) -> Option<Instant> {
+    pub(super) fn press_at(&self) -> Option<Instant> {
         match self.killed {
             _ if self.left_behind => None,
             Some(at) => Some(at + KILL_TIME),
-            None => Some(self.since + stop_within),
+            None => Some(self.since + self.within),
         }
     }
 }
 
 impl Child {
-    pub(super) fn ended_as_told(&mut self, ending: &ChildShutdown, how: &str, now: Instant) -> Option<String> {
-        let obeyed = if ending.killed.is_some() { "since it did not stop when told to" } else { "when told to" };
+    pub(super) fn ended_as_told(&mut self, then: Then, was_killed: bool, how: &str, now: Instant) -> Option<String> {
+        let obeyed = if was_killed { "since it did not stop when told to" } else { "when told to" };
         self.last_end = format!("{how} {obeyed}");
-        match ending.then {
+        match then {
             Then::End => {
                 self.rest(Phase::Ended);
                 None
@@ -67,7 +83,7 @@ impl Child {
             self.repeats = Repeats::default();
         }
         if let Some(ending) = &mut self.ending {
-            ending.then = then;
+            ending.cause = EndCause::Told(then);
             return;
         }
         self.note_switch(node);
@@ -77,7 +93,7 @@ impl Child {
         if self.process.is_some() || self.over.is_some() {
             self.process.iter_mut().for_each(|process| process.terminate(node));
             self.phase = Phase::Stopping;
-            self.ending = Some(ChildShutdown { then, since: now, killed: None, left_behind: false });
+            self.ending = Some(ChildShutdown::begin(EndCause::Told(then), self.stop_within, now));
         } else if then == Then::Start {
             (self.phase, self.since) = (Phase::Waiting, now);
         } else if !self.phase.is_over() {
@@ -87,17 +103,25 @@ impl Child {
 
     /// Sees to it that a process that was told to end does.
     pub(super) fn press(&mut self, node: &Node, now: Instant) -> Option<String> {
-        let (within, pid) = (self.stop_within, self.pid()?);
+        let pid = self.pid()?;
         let ending = self.ending.as_mut()?;
+        let within = ending.within;
         match ending.killed {
-            None if now >= ending.press_at(within)? => {
+            None if now >= ending.press_at()? => {
                 self.force(node, now);
-                Some(format!("{} did not stop within {within:?}; killed", self.text))
+                // Without any time it was not told to stop before.
+                (!within.is_zero()).then(|| format!("{} did not stop within {within:?}; killed", self.text))
             }
-            Some(_) if now >= ending.press_at(within)? => {
+            Some(_) if now >= ending.press_at()? => {
                 // It waits for broken hardware, say. The others still have to be looked after.
                 ending.left_behind = true;
-                Some(format!("{} (process {pid}) cannot even be killed; left behind", self.text))
+                let left = "cannot even be killed; left behind";
+                let EndCause::Hang(hang) = &ending.cause else {
+                    return Some(format!("{} (process {pid}) {left}", self.text));
+                };
+                let told = format!("{hang}, and its process {pid} {left}: none is started beside it");
+                self.printed.say(OutputLevel::Error, &told, None);
+                Some(format!("{} {told}", self.text))
             }
             _ => None,
         }

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 impl Child {
     /// What its process said last of itself in the node's table.
-    fn last_word(&self, node: &Node) -> Option<ParticipantInfo> {
+    pub(super) fn last_word(&self, node: &Node) -> Option<ParticipantInfo> {
         self.process.as_ref()?.last_word(node)
     }
 
