@@ -70,7 +70,7 @@ pub struct Motion {
     /// As a ring; `next` is the oldest. At first what nobody knows: anything, until the first command.
     told: [Option<Told>; COMMANDS],
     next: usize,
-    /// What anything forgotten may have been, and when it was forgotten.
+    /// Bounds of all that is forgotten, from when it was obeyed no more; before that, anything may have been.
     forgotten: (Bounds, u64),
     most: Bounds,
 }
@@ -93,8 +93,9 @@ impl Motion {
         let told = Told { at_ns: now_ns, replaced_ns: None, bounds: Bounds::of(command) };
         if let Some(oldest) = self.told[self.next].replace(told) {
             let (bounds, since_ns) = self.forgotten;
-            let rest = self.braked(bounds, since_ns, now_ns).with(self.of(&oldest, now_ns));
-            self.forgotten = (rest, now_ns);
+            let obeyed_ns = oldest.replaced_ns.unwrap_or(now_ns).saturating_add(self.lag_ns()).max(since_ns);
+            let rest = self.braked(bounds, since_ns, obeyed_ns).with(self.of(&oldest, obeyed_ns));
+            self.forgotten = (rest, obeyed_ns);
         }
         self.next = (self.next + 1) % COMMANDS;
     }
@@ -189,6 +190,7 @@ mod tests {
         motion.tell(10_000 * MS, ahead(1.5));
         (1..=80).for_each(|look| motion.tell((10_000 + look * 10) * MS, Command::STOP));
         assert_forward(&motion, 10_810, 1.5 - 0.75);
+        assert!((motion.from(10_560 * MS).forward_m_s - 1.0).abs() < 1e-9, "what is remembered reaches back further");
         assert_eq!(motion.from(10_000 * MS), MOST);
     }
 }
