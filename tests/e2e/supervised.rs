@@ -5,8 +5,8 @@ use crate::process::Running;
 use crate::robot::Robot;
 use nix::sys::signal::Signal;
 use rohrpost::interface::Interface;
-use rohrpost::interfaces::MotorInterface;
-use rohrpost::types::Twist;
+use rohrpost::interfaces::{SupervisorInterface, WheelsInterface};
+use rohrpost::types::{Odometry, Twist};
 use rohrpost::wire::{append, from_bytes};
 use serde_json::Value;
 
@@ -31,11 +31,12 @@ fn wait_for(place: &Place, what: &str, is_so: impl Fn(&Value) -> bool) {
     wait(what, || is_so(&control(place)).then_some(()));
 }
 
-/// The motor says so itself.
+/// By what the wheels say.
 fn wait_until_it_stands(robot: &Robot) {
     let mut tool = robot.tool(PATIENCE);
     wait("the robot stands", || {
-        let (_, twist): (u64, Twist) = robot.newest(&mut tool, "motor.1", MotorInterface::MOTION).ok()?;
+        let odometry = WheelsInterface::ODOMETRY.data();
+        let (_, Odometry { twist, .. }) = robot.newest(&mut tool, "odometry.0", odometry).ok()?;
         (twist == Twist::default()).then_some(())
     });
     tool.close();
@@ -50,8 +51,7 @@ fn a_stopped_and_a_killed_program_lose_control_and_regain_it() {
     wait_until_it_stands(&robot);
     signal(robot.pid("pilot.0"), Signal::SIGCONT);
     wait_for(&place, "it drives again", |state| state["mode"] == "Active" && state["gained"].as_u64() >= Some(2));
-    let killed = robot.kill("pilot.0");
-    robot.wait_restarted("pilot.0", killed.pid);
+    robot.kill("pilot.0");
     wait_for(&place, "its next run drives", |state| state["mode"] == "Active" && state["gained"].as_u64() >= Some(3));
     let out = launch.stop();
     assert!(!out.contains(TOUCHED) && out.contains("the driver has lost control; the robot brakes"), "{out}");
@@ -66,7 +66,7 @@ fn a_person_halts_takes_over_and_drives_at_walls_and_nobody_goes_past_the_wormho
         .say(&["call", "motor.1", "drive", "0.5", "0"])
         .fails_with(["[access]", "lists the classes that may command this one"]);
     let mut person = robot.tool(PATIENCE);
-    let supervisor = rohrpost::interfaces::SupervisorInterface::hash();
+    let supervisor = SupervisorInterface::hash();
     let mut call = |name: &str, function: u16, arguments: &[u8]| {
         let write = |body: &mut Vec<u8>| {
             body.extend_from_slice(arguments);

@@ -39,7 +39,7 @@ pub(super) struct WormholeModule {
     motor: MotorProxy,
     launch: Option<LauncherProxy>,
     program: Name,
-    /// Whoever has taken over.
+    /// The module that has taken over.
     person: Option<Name>,
     clock: ModuleClock,
     command: RunningCommand,
@@ -165,7 +165,7 @@ fn seen(taken_ns: u64, scan: &LaserScan) -> Scan<'_> {
 }
 
 impl WormholeModule {
-    /// Judges the command in effect, and tells the motor.
+    /// checks the command in effect, and tells the motor.
     fn look(&mut self) {
         let now_ns = self.clock.monotonic_ns();
         let late_ns = self.last_look_ns.map_or(0, |last_ns| now_ns.saturating_sub(last_ns));
@@ -173,8 +173,8 @@ impl WormholeModule {
         self.last_look_ns = Some(now_ns);
         let command = match (self.wormhole.in_effect(), &self.seen) {
             (Some(wanted), Some(Seen { taken_ns, scan })) if !self.sight.is_old(now_ns, *taken_ns) => {
-                let verdict = self.envelope.judge(now_ns, wanted, &seen(*taken_ns, scan), &self.motion);
-                self.told.judged(verdict);
+                let verdict = self.envelope.check(now_ns, wanted, &seen(*taken_ns, scan), &self.motion);
+                self.told.checked(verdict);
                 verdict.command()
             }
             _ => Command::STOP,

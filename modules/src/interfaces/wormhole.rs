@@ -5,7 +5,7 @@ use crate::interface;
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-/// Who has control of the motor.
+/// The driver's control of the motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[serde(rename_all = "lowercase")] // in JSON; postcard knows numbers only
 pub enum ControlMode {
@@ -20,14 +20,14 @@ pub enum ControlMode {
     Failed,
 }
 
-/// Whose promises count.
+/// The source of the promises that count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[serde(rename_all = "lowercase")] // in JSON; postcard knows numbers only
 pub enum ControlDriver {
     /// The robot's program.
     #[default]
     Program,
-    /// Whoever has taken over.
+    /// The module that has taken over.
     Person,
 }
 
@@ -43,9 +43,9 @@ pub struct CauseCount {
 /// How it stands with the motor.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ControlState {
-    /// Who has control.
+    /// The driver's control.
     pub mode: ControlMode,
-    /// Whose promises count.
+    /// The source of the promises that count.
     pub driver: ControlDriver,
     /// Whether the last scan can be believed.
     pub sees: bool,
@@ -62,7 +62,7 @@ pub struct ControlState {
     /// Looks at the command in effect that came later than configured.
     pub late_looks: u64,
     /// Commands in effect, by each look.
-    pub judged: u64,
+    pub checked: u64,
     /// Promises that were refused, and commands that were capped or refused; causes that never happened are left out.
     pub causes: Vec<CauseCount>,
 }
@@ -74,7 +74,8 @@ pub struct ControlRefusal(pub String);
 
 /// Lets commands through to the motor: in time, and within what the robot sees free.
 ///
-/// Programs that know `Motor` alone command it under the motor's name: each `drive` is a promise of a configured length.
+/// Programs that know `Motor` alone command it under the motor's name: each `drive` is a promise of a configured
+/// length.
 #[interface(class = "wormhole", crate = crate::macro_support)]
 pub trait Supervisor {
     /// Promises this motion (m/s forward, rad/s counter-clockwise) for so long, ms, and the next promise before that.
@@ -86,7 +87,7 @@ pub trait Supervisor {
     #[command(17)]
     fn halt(&mut self, number: u32) -> Result<(), ControlRefusal>;
 
-    /// Lets go the halts of the caller; who still holds the robot.
+    /// Lets go the halts of the caller; those that still hold the robot.
     #[command(18)]
     fn resume(&mut self) -> Vec<String>;
 

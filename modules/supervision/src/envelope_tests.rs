@@ -1,4 +1,5 @@
 use super::*;
+use core::f64::consts::FRAC_PI_2;
 use std::vec::Vec;
 
 extern crate std;
@@ -31,7 +32,7 @@ fn scan(ranges_m: &[f32]) -> Scan<'_> {
 }
 
 /// A robot that stood.
-fn judge_of(limits: Limits, command: (f64, f64), ranges_m: &[f32]) -> Verdict {
+fn check_of(limits: Limits, command: (f64, f64), ranges_m: &[f32]) -> Verdict {
     let mut motion = limits.motion();
     motion.tell(0, Command::STOP);
     motion.tell(800 * MS, Command::STOP);
@@ -39,15 +40,15 @@ fn judge_of(limits: Limits, command: (f64, f64), ranges_m: &[f32]) -> Verdict {
     // A second and more of braking: it stands by now.
     let now_ns = 10_000 * MS;
     let scan = Scan { taken_ns: now_ns - 100 * MS, ..scan(ranges_m) };
-    Envelope::new(limits, Mounting::default()).judge(now_ns, command, &scan, &motion)
+    Envelope::new(limits, Mounting::default()).check(now_ns, command, &scan, &motion)
 }
 
-fn judge(command: (f64, f64), ranges_m: &[f32]) -> Verdict {
-    judge_of(limits(), command, ranges_m)
+fn check(command: (f64, f64), ranges_m: &[f32]) -> Verdict {
+    check_of(limits(), command, ranges_m)
 }
 
 fn passes(command: (f64, f64), ranges_m: &[f32]) -> bool {
-    matches!(judge(command, ranges_m), Verdict::Passed(_))
+    matches!(check(command, ranges_m), Verdict::Passed(_))
 }
 
 #[test]
@@ -57,7 +58,7 @@ fn in_the_open_a_command_passes_as_it_is_and_one_beyond_the_motor_is_cut() {
         assert!(passes(command, &open), "{command:?}");
     }
     let cut = Command { speed_m_s: 1.0, turn_rate_rad_s: 0.0 };
-    assert_eq!(judge((9.0, 0.0), &open), Verdict::Capped(Capped { to: cut, why: Why::Limit }));
+    assert_eq!(check((9.0, 0.0), &open), Verdict::Capped(Capped { to: cut, why: Why::Limit }));
 }
 
 /// `v * (look + lag) + v² / 2b = way`, of a wall ahead; by hand.
@@ -65,11 +66,11 @@ fn in_the_open_a_command_passes_as_it_is_and_one_beyond_the_motor_is_cut() {
 fn towards_a_wall_the_speed_is_that_with_which_the_robot_still_stops() {
     for (wall_m, speed_m_s) in [(1.0, 1.0), (0.6, 0.6), (0.52, 0.4928)] {
         let wall = ranges(|degrees| (wall_m / degrees.to_radians().cos().max(0.01)).min(8.0) as f32);
-        let told = judge((1.0, 0.0), &wall).command().speed_m_s;
+        let told = check((1.0, 0.0), &wall).command().speed_m_s;
         assert!((told - speed_m_s).abs() < 0.001, "{wall_m} m: {told} m/s");
     }
     let near = ranges(|degrees| (0.301 / degrees.to_radians().cos().max(0.01)).min(8.0) as f32);
-    assert!(judge((1.0, 0.0), &near).command().speed_m_s < 0.01);
+    assert!(check((1.0, 0.0), &near).command().speed_m_s < 0.01);
 }
 
 #[test]
@@ -79,7 +80,7 @@ fn what_is_beside_or_behind_the_way_does_not_matter_and_turning_on_the_spot_alwa
     assert!(!passes((0.5, 1.0), &corridor), "into the wall");
     let enclosed = ranges(|_| 0.26);
     assert!(passes((0.0, 1.5), &enclosed) && passes((0.0, -1.5), &enclosed));
-    assert_eq!(judge((0.5, 0.0), &enclosed), Verdict::Refused(Why::Seen));
+    assert_eq!(check((0.5, 0.0), &enclosed), Verdict::Refused(Why::Seen));
 }
 
 #[test]
@@ -92,10 +93,10 @@ fn a_thing_at_the_side_ahead_stops_the_turn_towards_it_alone() {
 #[test]
 fn unseen_is_blocked() {
     let open = ranges(|_| 8.0);
-    assert_eq!(judge((-0.5, 0.0), &open), Verdict::Refused(Why::Unseen), "backward without eyes");
+    assert_eq!(check((-0.5, 0.0), &open), Verdict::Refused(Why::Unseen), "backward without eyes");
     for blind in [f32::NAN, 0.0, -1.0] {
         let half_blind = |from: f64| ranges(|degrees| if (from..from + 10.0).contains(&degrees) { blind } else { 8.0 });
-        assert_eq!(judge((1.0, 0.0), &half_blind(0.0)), Verdict::Refused(Why::Unseen));
+        assert_eq!(check((1.0, 0.0), &half_blind(0.0)), Verdict::Refused(Why::Unseen));
         assert!(passes((1.0, 0.0), &half_blind(60.0)), "beside the way");
     }
 }
@@ -103,7 +104,7 @@ fn unseen_is_blocked() {
 #[test]
 fn what_moves_is_kept_away_from_further() {
     let wall = ranges(|degrees| (1.2 / degrees.to_radians().cos().max(0.01)).min(8.0) as f32);
-    let [still, walking] = [0.0, 0.5].map(|others_m_s| judge_of(Limits { others_m_s, ..limits() }, (1.0, 0.0), &wall));
+    let [still, walking] = [0.0, 0.5].map(|others_m_s| check_of(Limits { others_m_s, ..limits() }, (1.0, 0.0), &wall));
     assert_eq!(still.command().speed_m_s, 1.0);
     assert!(walking.command().speed_m_s < 0.7, "{walking:?}");
 }
@@ -111,7 +112,7 @@ fn what_moves_is_kept_away_from_further() {
 #[test]
 fn a_robot_of_which_nothing_is_known_may_be_as_fast_as_it_can() {
     let (limits, wall) = (limits(), ranges(|degrees| (0.9 / degrees.to_radians().cos().max(0.01)).min(8.0) as f32));
-    let unknown = Envelope::new(limits, Mounting::default()).judge(
+    let unknown = Envelope::new(limits, Mounting::default()).check(
         1000 * MS,
         Command { speed_m_s: 0.3, turn_rate_rad_s: 0.0 },
         &scan(&wall),
@@ -134,7 +135,7 @@ fn a_robot_that_still_rolls_turns_only_where_there_is_room_for_that() {
     let now_ns = 10_000 * MS;
     let scan = Scan { taken_ns: now_ns - 100 * MS, start_rad: 0.0, ..scan(&beside) };
     let envelope = Envelope::new(limits, Mounting::default());
-    let turn = |turn_rate_rad_s| envelope.judge(now_ns, Command { speed_m_s: 0.0, turn_rate_rad_s }, &scan, &motion);
+    let turn = |turn_rate_rad_s| envelope.check(now_ns, Command { speed_m_s: 0.0, turn_rate_rad_s }, &scan, &motion);
     assert!(matches!(turn(1.5), Verdict::Refused(_)));
     assert!(matches!(turn(-1.5), Verdict::Passed(_)));
 }
@@ -155,6 +156,6 @@ fn a_scanner_that_is_mounted_elsewhere_sees_the_same_wall() {
     let now_ns = 10_000 * MS;
     let scan = Scan { taken_ns: now_ns, start_rad: -PI, step_rad: PI / 180.0, range_max_m: 8.0, ranges_m: &mounted };
     let forward = Command { speed_m_s: 1.0, turn_rate_rad_s: 0.0 };
-    let told = Envelope::new(limits(), mounting).judge(now_ns, forward, &scan, &motion).command();
+    let told = Envelope::new(limits(), mounting).check(now_ns, forward, &scan, &motion).command();
     assert!((told.speed_m_s - 0.6).abs() < 0.001, "{told:?}");
 }

@@ -1,4 +1,4 @@
-//! Who has stopped the robot. It stands until each of them lets it go.
+//! Callers that have stopped the robot. It stands until each of them lets it go.
 
 /// Halts held at a time. Each computer of a robot and each of its teammates may hold one, and this is a team of some.
 const HALTS_MAX: usize = 32;
@@ -12,7 +12,7 @@ pub struct HaltId {
     pub number: u32,
 }
 
-/// There is no room to remember whose halt this is. It holds all the same, until all are let go at once.
+/// There is no room to remember the caller of this halt. It holds all the same, until all are let go at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{HALTS_MAX} halts are held already; the robot stands, and `resume` of all lets it go")]
 pub struct TooManyHalts;

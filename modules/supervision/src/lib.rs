@@ -6,15 +6,15 @@
 //!                                                     deadline, mode, halts             scan, brakes
 //! ```
 //!
-//! - [`Wormhole`] judges *time*: a program has control as long as it keeps its own promises. Of a missed one, the robot
+//! - [`Wormhole`] checks *time*: a program has control as long as it keeps its own promises. Of a missed one, the robot
 //!   brakes; a program that fails again and again is to be restarted, then kept off until a person has looked.
-//! - [`Envelope`] judges *values*: a command passes only if the robot can still stop inside what its scanner saw free.
+//! - [`Envelope`] checks *values*: a command passes only if the robot can still stop inside what its scanner saw free.
 //!   What a lower speed makes safe is capped.
 //! - [`Sight`] says whether a scan may be believed: new, young and not frozen.
-//! - [`Halts`]: who has stopped the robot, until each of them lets it go.
+//! - [`Halts`]: callers that have stopped the robot, until each of them lets it go.
 //!
-//! Time is an argument: nanoseconds of a monotonic clock, any origin. Nothing here allocates, waits or reads a clock, so
-//! that the same code runs in the module `wormhole`, in simulations, and on a microcontroller.
+//! Time is an argument: nanoseconds of a monotonic clock, any origin. Nothing here allocates, waits or reads a clock:
+//! the same code runs in the module `wormhole`, in simulations, and on a microcontroller.
 //!
 //! The promise is *passive orientation safety* (Mitsch and others, International Journal of Robotics Research 2017,
 //! arXiv 1605.00604): the robot does not move towards a point of contact that its scanner could see. What is not
@@ -26,15 +26,19 @@
 mod command;
 mod envelope;
 mod halts;
+mod limits;
 mod motion;
 mod promise;
+mod sector;
 mod sight;
+mod way;
 mod window;
 mod wormhole;
 
 pub use command::Command;
-pub use envelope::{Capped, Envelope, Limits, Mounting, Verdict, Why};
+pub use envelope::{Capped, Envelope, Mounting, Verdict, Why};
 pub use halts::{HaltId, Halts, TooManyHalts};
+pub use limits::Limits;
 pub use motion::{Bounds, Motion};
 pub use promise::{Order, Promise, Refusal};
 pub use sight::{NoSight, Scan, Sight};

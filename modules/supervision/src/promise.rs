@@ -5,7 +5,7 @@ use crate::Command;
 /// A command with the time for which it is meant. The next promise is to come before that time is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Promise {
-    /// Who promises, and in which order.
+    /// The run that promises, and its place in the order.
     pub order: Order,
     /// Time from when it was made until the next one, ns.
     pub duration_ns: u64,
@@ -47,7 +47,7 @@ pub enum Refusal {
     /// A program of the same name that began later has promised already.
     #[error("a newer run of this program has control; this one is to end")]
     OldIncarnation,
-    /// A repetition, or one that was overtaken.
+    /// A repetition, or one that came behind a newer one.
     #[error("this promise is not newer than the last one")]
     OldSequence,
     /// Its time was over when it came.

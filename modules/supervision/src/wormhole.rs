@@ -1,4 +1,4 @@
-//! Who has control, and until when: the seed's wormhole, with its defects mended (digest, section 1, [B1] to [B4]).
+//! Control of the motor, and its end: the seed's wormhole, without its defects (digest, section 1, [B1] to [B4]).
 //!
 //! ```text
 //!            a promise            the next one in time: control on
@@ -10,10 +10,13 @@
 //!
 //! In each mode but `Active`, and while anybody holds a halt, no command is in effect: the robot brakes.
 //!
-//! Decided where the seed is silent: the wormhole starts disabled. The promise that ends `Test` is in effect. A deadline
-//! that is missed in `Test` counts as a failure, and the wait begins anew. The wait applies to the start of a restarted
-//! program, too. A deadline may come nearer by a later promise: a program may bind itself more, never less than it said
-//! last. A person's missed deadline stops the robot, and restarts nothing.
+//! Decided where the seed is silent:
+//!
+//! - The wormhole starts disabled. The promise that ends `Test` is in effect.
+//! - A deadline that is missed in `Test` counts as a failure, and the wait begins anew. The wait applies to the start
+//!   of a restarted program, too.
+//! - A deadline may come nearer by a later promise: a program may bind itself more, never less than it said last.
+//! - A person's missed deadline stops the robot, and restarts nothing.
 
 use crate::window::{REMEMBERED, Window};
 use crate::{Command, Halts, Order, Promise, Refusal};
@@ -45,7 +48,7 @@ impl Default for Settings {
     }
 }
 
-/// Who has control.
+/// The driver's control of the motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// Nobody: the driver has not promised since control was lost.
@@ -59,7 +62,7 @@ pub enum Mode {
     Failed,
 }
 
-/// Whose promises count.
+/// The source of the promises that count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Driver {
     /// The robot's own program.
@@ -133,7 +136,7 @@ pub struct Wormhole {
     failures: u32,
     window: Window,
     wait: Option<Wait>,
-    /// Who has stopped the robot.
+    /// Callers that have stopped the robot.
     pub halts: Halts,
 }
 
@@ -156,12 +159,12 @@ impl Wormhole {
         }
     }
 
-    /// Who has control.
+    /// The driver's control.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// Whose promises count.
+    /// The source of the promises that count.
     pub fn driver(&self) -> Driver {
         self.driver
     }
@@ -312,8 +315,8 @@ impl Wormhole {
         had_control.then_some(Control::Off)
     }
 
-    /// Whether the robot sees. A robot that does not loses its driver, and tries it anew when it sees again; the program
-    /// is not blamed.
+    /// Whether the robot sees. Without sight the driver loses control, and is tried anew when there is sight again; the
+    /// program is not blamed.
     pub fn set_sight(&mut self, now_ns: u64, sees: bool) -> Change {
         let passed = self.look(now_ns);
         self.sees = sees;

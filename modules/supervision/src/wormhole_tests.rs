@@ -187,7 +187,7 @@ fn while_a_person_drives_the_program_does_not_and_neither_is_blamed_for_the_chan
     }
     assert_eq!(rig.wormhole.in_effect(), Some(FORWARD));
     rig.pass(5_000);
-    assert_eq!(rig.wormhole.in_effect(), None, "a person who lets go stops the robot");
+    assert_eq!(rig.wormhole.in_effect(), None, "a person that lets go stops the robot");
     assert!(rig.restarts.is_empty() && rig.wormhole.failures() == 0);
     assert_eq!(rig.wormhole.set_driver(rig.now_ns, Driver::Program).control, None);
     assert_eq!((rig.promise(), rig.promise(), rig.wormhole.mode()), (Ok(()), Ok(()), Mode::Active));

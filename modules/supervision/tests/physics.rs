@@ -22,12 +22,12 @@ const MS: u64 = 1_000_000;
 struct Outcome {
     bumps: u64,
     /// Commands to drive, those capped or refused, and the way that was made.
-    judged: u64,
+    checked: u64,
     changed: u64,
     way_m: f64,
 }
 
-/// A world with blocks, a robot in it, a motor and a scanner with delays, and somebody who commands at random.
+/// A world with blocks, a robot in it, a motor and a scanner with delays, and a driver that commands at random.
 struct Trial {
     random: ChaCha8Rng,
     robot: Simulator,
@@ -163,22 +163,22 @@ impl Trial {
     }
 
     fn look(&mut self, now_ns: u64) {
-        let command = if self.is_supervised { self.judged(now_ns) } else { self.wanted };
+        let command = if self.is_supervised { self.checked(now_ns) } else { self.wanted };
         self.motion.tell(now_ns, command);
         let lag_ns = self.random.random_range(0..=(self.limits.lag_s * 1e9) as u64 / STEP_NS - 1) * STEP_NS;
         let last_ns = self.to_motor.back().map_or(0, |(at_ns, _)| *at_ns);
         self.to_motor.push_back(((now_ns + lag_ns).max(last_ns), command));
     }
 
-    fn judged(&mut self, now_ns: u64) -> Command {
+    fn checked(&mut self, now_ns: u64) -> Command {
         let Some((taken_ns, scan)) = self.seen.as_ref().filter(|(taken_ns, _)| !self.sight.is_old(now_ns, *taken_ns))
         else {
             return Command::STOP;
         };
         let envelope = Envelope::new(self.limits, Mounting::default());
-        let verdict = envelope.judge(now_ns, self.wanted, &seen(*taken_ns, scan), &self.motion);
+        let verdict = envelope.check(now_ns, self.wanted, &seen(*taken_ns, scan), &self.motion);
         if self.wanted.speed_m_s != 0.0 {
-            self.outcome.judged += 1;
+            self.outcome.checked += 1;
             self.outcome.changed += u64::from(!matches!(verdict, Verdict::Passed(_)));
         }
         verdict.command()
@@ -205,12 +205,12 @@ fn nothing_is_touched_whatever_is_commanded_and_without_the_envelope_it_is() {
     for seed in 0..worlds() {
         let outcome = Trial::new(seed, true).run();
         assert_eq!(outcome.bumps, 0, "seed {seed}: {outcome:?}");
-        sum.judged += outcome.judged;
+        sum.checked += outcome.checked;
         sum.changed += outcome.changed;
         sum.way_m += outcome.way_m;
     }
     let bare = (0..worlds().min(100)).filter(|seed| Trial::new(*seed, false).run().bumps > 0).count() as u64;
     assert!(bare * 2 > worlds().min(100), "without the envelope only {bare} worlds were touched");
-    assert!(sum.changed * 5 > sum.judged, "the envelope had too little to do: {sum:?}");
+    assert!(sum.changed * 5 > sum.checked, "the envelope had too little to do: {sum:?}");
     assert!(sum.way_m > worlds() as f64, "the robot hardly drives: {sum:?}");
 }

@@ -53,7 +53,7 @@ fn drive(seed: u64, is_supervised: bool) -> Drive {
                 range_max_m: scan.range_max_m.into(),
                 ranges_m: &scan.ranges_m,
             };
-            let verdict = envelope.judge(now_ns, wanted, &seen, &motion);
+            let verdict = envelope.check(now_ns, wanted, &seen, &motion);
             drive.commands += 1;
             drive.changed += u64::from(!matches!(verdict, Verdict::Passed(_)));
             verdict.command()

@@ -10,7 +10,7 @@ use rohrpost_supervision::{Capped, Driver, Mode, Refusal, Verdict, Why, Wormhole
 pub(super) struct Told {
     classes: ClassTable,
     pub(super) late_looks: u64,
-    judged: u64,
+    checked: u64,
     gained: u64,
     lost: u64,
     restarts: u64,
@@ -26,7 +26,7 @@ impl Told {
         Self {
             classes,
             late_looks: 0,
-            judged: 0,
+            checked: 0,
             gained: 0,
             lost: 0,
             restarts: 0,
@@ -38,8 +38,8 @@ impl Told {
         }
     }
 
-    pub(super) fn judged(&mut self, verdict: Verdict) {
-        self.judged += 1;
+    pub(super) fn checked(&mut self, verdict: Verdict) {
+        self.checked += 1;
         match verdict {
             Verdict::Passed(_) => {}
             Verdict::Capped(Capped { why, .. }) => add(&mut self.capped, &Why::ALL, why),
@@ -116,7 +116,7 @@ impl Told {
             gained: self.gained,
             lost: self.lost,
             late_looks: self.late_looks,
-            judged: self.judged,
+            checked: self.checked,
             causes: refusals.chain(capped).chain(refused).collect(),
         }
     }
