@@ -5,7 +5,7 @@ use crate::process::Running;
 use crate::robot::Robot;
 use nix::sys::signal::Signal;
 use rohrpost::interface::Interface;
-use rohrpost::interfaces::{SupervisorInterface, WheelsInterface};
+use rohrpost::interfaces::{ControlRefusal, SupervisorInterface, WheelsInterface};
 use rohrpost::types::{Odometry, Twist};
 use rohrpost::wire::{append, from_bytes};
 use serde_json::Value;
@@ -67,31 +67,38 @@ fn a_person_halts_takes_over_and_drives_at_walls_and_nobody_goes_past_the_wormho
         .fails_with(["[access]", "lists the classes that may command this one"]);
     let mut person = robot.tool(PATIENCE);
     let supervisor = SupervisorInterface::hash();
-    let mut call = |name: &str, function: u16, arguments: &[u8]| {
+    let mut call = |function: u16, arguments: &[u8]| {
         let write = |body: &mut Vec<u8>| {
             body.extend_from_slice(arguments);
             Ok(())
         };
-        person.call(robot.name(name), function, supervisor, write, |bytes| Ok(bytes.to_vec())).unwrap()
+        person.call(robot.name("wormhole.0"), function, supervisor, write, |bytes| Ok(bytes.to_vec())).unwrap()
     };
-    // halt(1), resume(): still held by nobody.
-    call("wormhole.0", 17, &[1]);
+    let is_taken = |answer: Vec<u8>| from_bytes::<Result<(), ControlRefusal>>(&answer).unwrap() == Ok(());
+    // halt(1), resume(): then held by nobody.
+    assert!(is_taken(call(17, &[1])));
     wait_until_it_stands(&robot);
     assert_eq!(control(&place)["halted_by"].as_array().map(Vec::len), Some(1));
-    assert_eq!(from_bytes::<Vec<String>>(&call("wormhole.0", 18, &[])).unwrap(), [""; 0]);
-    // take_over(): full speed ahead, without a look.
-    call("wormhole.0", 20, &[]);
+    assert_eq!(from_bytes::<Vec<String>>(&call(18, &[])).unwrap(), [""; 0]);
+    // take_over(): full speed ahead, without a look, until a wall is in the way.
+    assert!(is_taken(call(20, &[])));
+    let in_the_way = |state: &Value| -> u64 {
+        let causes = state["causes"].as_array().unwrap();
+        let of_walls = causes.iter().filter(|cause| cause["cause"].as_str().unwrap().contains("is in the way"));
+        of_walls.map(|cause| cause["count"].as_u64().unwrap()).sum()
+    };
     let mut ahead = Vec::new();
     append(&mut ahead, &(500_u32, 0.7, 0.2)).unwrap();
+    let (mut driven, before) = (0, in_the_way(&control(&place)));
     wait("the envelope has something to do", || {
-        call("wormhole.0", 16, &ahead);
-        let causes = control(&place)["causes"].to_string();
-        (causes.contains("something is in the way")).then_some(())
+        driven += u32::from(is_taken(call(16, &ahead)));
+        let state = control(&place);
+        let drives = state["mode"] == "Active" && state["driver"] == "Person";
+        (driven > 2 && drives && in_the_way(&state) > before).then_some(())
     });
     // give_back()
-    call("wormhole.0", 21, &[]);
+    assert!(is_taken(call(21, &[])));
     wait_for(&place, "the pilot drives again", |state| state["mode"] == "Active" && state["driver"] == "Program");
-    drop(call);
     person.close();
     let out = launch.stop();
     assert!(!out.contains(TOUCHED), "{out}");

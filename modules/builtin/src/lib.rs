@@ -12,7 +12,6 @@ pub mod format;
 mod mapper;
 mod output;
 mod pilot;
-mod scans;
 mod settings;
 mod sim;
 mod wormhole;

@@ -2,12 +2,13 @@
 
 mod poses;
 
-use super::scans::Scans;
 use super::settings::{self, Called, RefusedSetting, Settings as _};
 use poses::{NoPose, Poses};
 use rohrpost_modules::interface::Interface;
 use rohrpost_modules::interfaces::{Cartographer, CartographerInterface, LaserInterface, MapCounts, WheelsInterface};
-use rohrpost_modules::runtime::{Context, Moment, Received};
+use rohrpost_modules::runtime::{
+    Context, ContextError, Moment, Rate, Received, StreamSubscription, Subscription, Unreadable,
+};
 use rohrpost_modules::types::{LaserScan, Pose};
 use rohrpost_modules::{Module, ModuleError};
 use rohrpost_robot::grid::{Mapper, Settings as GridSettings, TileIndex};
@@ -77,11 +78,38 @@ pub(super) struct MapModule {
     counts: MapCounts,
 }
 
+/// How scans come.
+enum Scans {
+    /// From the stream of a module on this node.
+    Stream(StreamSubscription<LaserScan>),
+    /// From another node, in packages.
+    Packages(Subscription<LaserScan>),
+}
+
 /// A scan with a pose that is not known yet.
 struct WaitingScan {
     moment: Moment,
     stamp_ns: u64,
     scan: LaserScan,
+}
+
+impl Scans {
+    fn subscribe(context: &mut Context, laser: &str) -> Result<Self, ContextError> {
+        match context.subscribe_stream(LaserInterface::SCAN, laser) {
+            Ok(stream) => Ok(Self::Stream(stream)),
+            Err(ContextError::FarStream { .. }) => {
+                context.subscribe(LaserInterface::SCAN.data(), laser, Rate::Each).map(Self::Packages)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn read(&self, data: &Received<'_>) -> Result<Option<LaserScan>, Unreadable> {
+        match self {
+            Self::Stream(stream) => data.read(stream),
+            Self::Packages(packages) => data.read(packages),
+        }
+    }
 }
 
 impl Module for MapModule {

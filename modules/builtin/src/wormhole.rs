@@ -9,16 +9,16 @@ mod check;
 mod settings;
 mod state;
 
-use super::scans::Scans;
 use super::settings::Settings as _;
 pub(super) use check::problems;
 use rohrpost_launch::launcher::LauncherProxy;
 use rohrpost_mailbox::Name;
 use rohrpost_modules::interface::Proxy;
 use rohrpost_modules::interfaces::{
-    ControlRefusal, ControlState, DriveError, Motor, MotorInterface, MotorProxy, Supervisor, SupervisorInterface,
+    ControlRefusal, ControlState, DriveError, LaserInterface, Motor, MotorInterface, MotorProxy, Supervisor,
+    SupervisorInterface,
 };
-use rohrpost_modules::runtime::{Context, ModuleClock, Received, RunningCommand, WakeUp};
+use rohrpost_modules::runtime::{Context, ModuleClock, Received, RunningCommand, StreamSubscription, WakeUp};
 use rohrpost_modules::types::LaserScan;
 use rohrpost_modules::{Module, ModuleError};
 use rohrpost_supervision::{
@@ -28,6 +28,9 @@ use settings::Settings;
 use state::Told;
 use std::time::Duration;
 
+/// Promises are looked at once in this time at most.
+const LOOK_MIN_NS: u64 = 5_000_000;
+
 pub(super) struct WormholeModule {
     settings: Settings,
     wormhole: Wormhole,
@@ -35,7 +38,7 @@ pub(super) struct WormholeModule {
     motion: Motion,
     sight: Sight,
     seen: Option<Seen>,
-    scans: Scans,
+    scans: StreamSubscription<LaserScan>,
     motor: MotorProxy,
     launch: Option<LauncherProxy>,
     program: Name,
@@ -45,6 +48,8 @@ pub(super) struct WormholeModule {
     command: RunningCommand,
     wake_up: WakeUp,
     last_look_ns: Option<u64>,
+    /// Before that the robot stands, whatever was before the start: nothing moves it past the wormhole.
+    has_driven: bool,
     time: Epochs,
     told: Told,
 }
@@ -83,8 +88,9 @@ impl Module for WormholeModule {
         let launcher = installation.module(program).and_then(|module| installation.node(&module.node));
         let launcher = launcher.map(|node| installation.launch_of(node));
         let launch = launcher.map(|launcher| LauncherProxy::new(context.link(), launcher));
-        let scans = Scans::subscribe(context, &settings.laser)?;
-        let motor = context.proxy::<MotorProxy>(&settings.motor)?;
+        let scans = context.subscribe_stream(LaserInterface::SCAN, &settings.laser)?;
+        // What waits longer than that is not run: the envelope counts on it.
+        let motor = context.proxy::<MotorProxy>(&settings.motor)?.with_timeout(settings.lag());
         let limits = settings.limits();
         context.use_computer_clock();
         context.set_period(Duration::from_millis(settings.look_ms.into()));
@@ -103,6 +109,7 @@ impl Module for WormholeModule {
             command: context.running_command(),
             wake_up: context.wake_up(),
             last_look_ns: None,
+            has_driven: false,
             time: Epochs { settles_ns: settings.scan_age_max_ns(), epoch: context.now().epoch, since_ns: 0 },
             told: Told::new(context.installation().classes.clone()),
             settings,
@@ -119,7 +126,7 @@ impl Module for WormholeModule {
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let now_ns = self.clock.monotonic_ns();
-        let sees = self.seen.as_ref().is_some_and(|seen| !self.sight.is_old(now_ns, seen.taken_ns));
+        let sees = self.sees(now_ns);
         let change = self.wormhole.set_sight(now_ns, sees);
         self.follow(change);
         self.look();
@@ -132,22 +139,25 @@ impl Module for WormholeModule {
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        let Some(scan) = self.scans.read(data)? else { return Ok(()) };
+        // A record that cannot be read is no scan; the last one grows old.
+        let Ok(Some(scan)) = data.read(&self.scans) else { return Ok(()) };
         let (now_ns, system) = (self.clock.monotonic_ns(), self.clock.now());
         if !self.time.is_steady(now_ns, system.epoch) {
             return Ok(());
         }
-        let error = if matches!(self.scans, Scans::Stream(_)) { Duration::ZERO } else { system.error };
-        let age_ns = u128::from(system.ns.saturating_sub(data.head.stamp_ns)) + error.as_nanos();
-        let taken_ns = now_ns.saturating_sub(u64::try_from(age_ns).unwrap_or(u64::MAX));
-        let moved = self.seen.as_ref().is_none_or(|seen| self.motion.from(seen.taken_ns) != Default::default());
+        // Stream and wormhole are on one node, and read one clock: a stamp of the future is none.
+        let Some(age_ns) = system.ns.checked_sub(data.head.stamp_ns) else { return Ok(()) };
+        let taken_ns = now_ns.saturating_sub(age_ns);
+        let since_ns = self.seen.as_ref().map_or(taken_ns, |seen| seen.taken_ns);
+        let moved = self.has_driven && self.motion.from(since_ns) != Default::default();
         match self.sight.look(now_ns, &seen(taken_ns, &scan), moved) {
             Ok(()) => self.seen = Some(Seen { taken_ns, scan }),
             // The scan before is as true as it was, and grows old.
             Err(NoSight::Repeated | NoSight::Old) => {}
-            Err(NoSight::Blind | NoSight::Frozen) => self.seen = None,
+            Err(NoSight::Blind | NoSight::Frozen | NoSight::Malformed) => self.seen = None,
         }
-        let change = self.wormhole.set_sight(now_ns, self.seen.is_some());
+        let sees = self.sees(now_ns);
+        let change = self.wormhole.set_sight(now_ns, sees);
         self.follow(change);
         self.look();
         Ok(())
@@ -165,7 +175,11 @@ fn seen(taken_ns: u64, scan: &LaserScan) -> Scan<'_> {
 }
 
 impl WormholeModule {
-    /// checks the command in effect, and tells the motor.
+    fn sees(&self, now_ns: u64) -> bool {
+        self.seen.as_ref().is_some_and(|seen| !self.sight.is_old(now_ns, seen.taken_ns))
+    }
+
+    /// Checks the command in effect, and tells the motor.
     fn look(&mut self) {
         let now_ns = self.clock.monotonic_ns();
         let late_ns = self.last_look_ns.map_or(0, |last_ns| now_ns.saturating_sub(last_ns));
@@ -179,9 +193,12 @@ impl WormholeModule {
             }
             _ => Command::STOP,
         };
-        self.motion.tell(now_ns, command);
         // Not waited for: the next look comes before an answer would help.
         let sent = self.motor.begin_drive(command.speed_m_s, command.turn_rate_rad_s);
+        if sent.is_ok() {
+            self.motion.tell(now_ns, command);
+            self.has_driven |= command != Command::STOP;
+        }
         self.told.motor(sent.err().map(|error| error.to_string()));
         self.wake_up.at(self.wormhole.due_ns());
     }
@@ -196,7 +213,12 @@ impl WormholeModule {
         if change.restart.is_none() {
             return;
         }
-        let asked = self.launch.as_ref().map(|launch| launch.begin_restart(self.settings.program.clone()).map(drop));
+        let cause = format!("kept no promise for {} ms", self.settings.wait_ms);
+        let program = self.settings.program.clone();
+        let asked = self.launch.as_ref().map(|launch| {
+            // Of one that began later than that, the silence was another one's.
+            launch.begin_end_failing(program, cause, self.settings.wait_ms).map(drop)
+        });
         self.told.restarted(&self.settings.program, asked);
     }
 
@@ -219,14 +241,33 @@ impl WormholeModule {
         let now_ns = self.clock.monotonic_ns();
         let (change, taken) = self.wormhole.promise(now_ns, facts.age_ns, driver, promise);
         self.follow(change);
-        self.look();
+        // A flood of promises is no flood of commands: those that come in between are looked at a little later.
+        let next_look_ns = self.last_look_ns.map_or(0, |last_ns| last_ns + LOOK_MIN_NS);
+        if taken.is_ok() && now_ns >= next_look_ns {
+            self.look();
+        } else {
+            let later_ns = taken.is_ok().then_some(next_look_ns);
+            self.wake_up.at(later_ns.into_iter().chain(self.wormhole.due_ns()).min());
+        }
         taken.map_err(|refusal| {
             self.told.refused(refusal);
             refusal.to_string()
         })
     }
 
+    /// What only people may call.
+    fn refuse_program(&self) -> Result<Name, ControlRefusal> {
+        let from = self.command.get().from;
+        if from == self.program {
+            return Err(ControlRefusal(format!("{} is what is supervised here", self.settings.program)));
+        }
+        Ok(from)
+    }
+
     fn drive_by(&mut self, person: Option<Name>) {
+        if person.is_some() && person == self.person {
+            return;
+        }
         self.person = person;
         let driver = if person.is_some() { Driver::Person } else { Driver::Program };
         let change = self.wormhole.set_driver(self.clock.monotonic_ns(), driver);
@@ -264,24 +305,34 @@ impl Supervisor for WormholeModule {
         self.told.halted_by(&self.wormhole)
     }
 
-    fn resume_all(&mut self) {
+    fn resume_all(&mut self) -> Result<(), ControlRefusal> {
+        self.refuse_program()?;
         self.wormhole.halts.resume_all();
         self.look();
+        Ok(())
     }
 
-    fn take_over(&mut self) {
-        self.drive_by(Some(self.command.get().from));
+    fn take_over(&mut self) -> Result<(), ControlRefusal> {
+        let person = self.refuse_program()?;
+        self.drive_by(Some(person));
+        Ok(())
     }
 
-    fn give_back(&mut self) {
+    fn give_back(&mut self) -> Result<(), ControlRefusal> {
+        self.refuse_program()?;
         self.drive_by(None);
+        Ok(())
     }
 
-    fn reset(&mut self) {
-        self.wormhole.reset();
+    fn reset(&mut self) -> Result<(), ControlRefusal> {
+        self.refuse_program()?;
+        self.wormhole.reset(self.clock.monotonic_ns());
+        self.sight.reset();
+        Ok(())
     }
 
     fn state(&mut self) -> ControlState {
-        self.told.state(&self.wormhole, self.seen.is_some())
+        let sees = self.sees(self.clock.monotonic_ns());
+        self.told.state(&self.wormhole, sees)
     }
 }

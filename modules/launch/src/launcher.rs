@@ -234,6 +234,12 @@ pub trait Launcher {
     /// Begins a new epoch of the node's time at the computer's clock; its number.
     #[command(22)]
     fn new_epoch(&mut self) -> Result<u64, ControlError>;
+
+    /// Ends a module that does not do its work, as its watchdog would: a failure that its restart policy counts. Only if
+    /// it is on, in a process that has run for so long at least, ms; whether it was. One that was stopped, switched off,
+    /// or started again meanwhile is left alone.
+    #[command(23)]
+    fn end_failing(&mut self, module: String, cause: String, ran_for_ms: u32) -> Result<bool, ControlError>;
 }
 
 /// The functions' numbers.
@@ -244,6 +250,8 @@ const START: u16 = 19;
 pub(crate) const LOOK: u16 = 20;
 pub(crate) const LOOK_ON: u16 = 21;
 const NEW_EPOCH: u16 = 22;
+#[cfg(test)]
+const END_FAILING: u16 = 23;
 
 /// The name under which the launch of a node takes commands, if the configuration has this node.
 ///
@@ -277,6 +285,9 @@ mod tests {
         let numbers: Vec<(&str, u16)> = functions.iter().map(|f| (f.name.as_str(), f.number)).collect();
         let controls = [("children", CHILDREN), ("restart", RESTART), ("stop", STOP), ("start", START)];
         assert_eq!(numbers[..4], controls);
-        assert_eq!(numbers[4..], [("look", LOOK), ("look_on", LOOK_ON), ("new_epoch", NEW_EPOCH)]);
+        assert_eq!(
+            numbers[4..],
+            [("look", LOOK), ("look_on", LOOK_ON), ("new_epoch", NEW_EPOCH), ("end_failing", END_FAILING)]
+        );
     }
 }

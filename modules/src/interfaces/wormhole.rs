@@ -67,12 +67,13 @@ pub struct ControlState {
     pub causes: Vec<CauseCount>,
 }
 
-/// Why a promise or a halt was not taken, in words.
+/// Why a call was refused, in words.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema, thiserror::Error)]
 #[error("{0}")]
 pub struct ControlRefusal(pub String);
 
-/// Lets commands through to the motor: in time, and within what the robot sees free.
+/// Lets commands through to the motor: in time, and within what the robot sees free. What people call, the supervised
+/// program may not: `resume_all`, `take_over`, `give_back`, `reset`.
 ///
 /// Programs that know `Motor` alone command it under the motor's name: each `drive` is a promise of a configured
 /// length.
@@ -93,19 +94,19 @@ pub trait Supervisor {
 
     /// Lets go the halts of all.
     #[command(19)]
-    fn resume_all(&mut self);
+    fn resume_all(&mut self) -> Result<(), ControlRefusal>;
 
     /// From now on the caller's promises count, and no others, until `give_back`.
     #[command(20)]
-    fn take_over(&mut self);
+    fn take_over(&mut self) -> Result<(), ControlRefusal>;
 
     /// From now on those of the robot's program count again.
     #[command(21)]
-    fn give_back(&mut self);
+    fn give_back(&mut self) -> Result<(), ControlRefusal>;
 
     /// A person has looked why the program failed: it may try again.
     #[command(22)]
-    fn reset(&mut self);
+    fn reset(&mut self) -> Result<(), ControlRefusal>;
 
     /// How it stands.
     #[command(23, idempotent)]

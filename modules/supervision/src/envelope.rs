@@ -92,7 +92,7 @@ const CREEP_M_S: f64 = 0.005;
 /// Directions without a beam are looked at so close together.
 const UNSEEN_STEP_RAD: f64 = PI / 90.0;
 
-/// checks commands.
+/// Checks commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Envelope {
     limits: Limits,
@@ -165,8 +165,9 @@ impl Envelope {
         let turn = Direction::of(scan.step_rad);
         let mut beam = Direction::of(self.mounting.heading_rad + scan.start_rad);
         for range_m in scan.ranges_m {
-            let range_m = f64::from(*range_m);
-            if range_m > 0.0 {
+            if Scan::is_reading(*range_m) {
+                // Nothing came back: what is further than that is not known.
+                let range_m = f64::from(*range_m).min(scan.range_max_m);
                 let (x_m, y_m) = (self.mounting.x_m + range_m * beam.x, self.mounting.y_m + range_m * beam.y);
                 room.or(sector.contact_m(x_m, y_m, ring_m + others_m), Why::Seen);
             } else {

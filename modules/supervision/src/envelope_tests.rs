@@ -101,6 +101,21 @@ fn unseen_is_blocked() {
     }
 }
 
+/// By its maker's code, a reading beyond the range says that nothing came back.
+#[test]
+fn what_is_beyond_the_range_is_not_known() {
+    let mut motion = limits().motion();
+    motion.tell(0, Command::STOP);
+    let now_ns = 10_000 * MS;
+    for nothing in [4.0, f32::INFINITY] {
+        let ranges_m = ranges(|_| nothing);
+        let scan = Scan { taken_ns: now_ns, range_max_m: 0.6, ..scan(&ranges_m) };
+        let forward = Command { speed_m_s: 1.0, turn_rate_rad_s: 0.0 };
+        let told = Envelope::new(limits(), Mounting::default()).check(now_ns, forward, &scan, &motion).command();
+        assert!((told.speed_m_s - 0.6).abs() < 0.001, "{told:?}");
+    }
+}
+
 #[test]
 fn what_moves_is_kept_away_from_further() {
     let wall = ranges(|degrees| (1.2 / degrees.to_radians().cos().max(0.01)).min(8.0) as f32);

@@ -58,6 +58,11 @@ impl Halts {
         self.has_unnamed || self.held().next().is_some()
     }
 
+    /// Whether it is held without a name, until [`Halts::resume_all`].
+    pub fn has_unnamed(&self) -> bool {
+        self.has_unnamed
+    }
+
     /// Those that hold it.
     pub fn held(&self) -> impl Iterator<Item = HaltId> + '_ {
         self.held.iter().flatten().copied()

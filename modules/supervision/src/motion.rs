@@ -2,7 +2,8 @@
 
 use crate::Command;
 
-/// Commands remembered. At 100 a second they reach back further than any scan that is believed.
+/// Changes of the command remembered. At 100 a second they reach back further than any scan that is believed; of more,
+/// the robot may have moved as fast as it can.
 const COMMANDS: usize = 64;
 
 /// Least and most of speed and turn rate over some time.
@@ -84,13 +85,16 @@ impl Motion {
         Self { lag_s, braking_m_s2, turn_braking_rad_s2, told, next: 1, forgotten, most }
     }
 
-    /// The motor is told this now.
+    /// The motor is told this now. Told the same again, nothing changes.
     pub fn tell(&mut self, now_ns: u64, command: Command) {
-        let last = (self.next + COMMANDS - 1) % COMMANDS;
+        let (last, bounds) = ((self.next + COMMANDS - 1) % COMMANDS, Bounds::of(command));
         if let Some(last) = &mut self.told[last] {
+            if last.bounds == bounds {
+                return;
+            }
             last.replaced_ns = Some(now_ns);
         }
-        let told = Told { at_ns: now_ns, replaced_ns: None, bounds: Bounds::of(command) };
+        let told = Told { at_ns: now_ns, replaced_ns: None, bounds };
         if let Some(oldest) = self.told[self.next].replace(told) {
             let (bounds, since_ns) = self.forgotten;
             let obeyed_ns = oldest.replaced_ns.unwrap_or(now_ns).saturating_add(self.lag_ns()).max(since_ns);
@@ -188,7 +192,8 @@ mod tests {
         let mut motion = motion();
         motion.tell(0, Command::STOP);
         motion.tell(10_000 * MS, ahead(1.5));
-        (1..=80).for_each(|look| motion.tell((10_000 + look * 10) * MS, Command::STOP));
+        (1..=80).for_each(|look| motion.tell((10_000 + look * 10) * MS, ahead(0.001 * (look % 2) as f64)));
+        // The first of them was sent 10 ms after, and obeyed 50 ms later.
         assert_forward(&motion, 10_810, 1.5 - 0.75);
         assert!((motion.from(10_560 * MS).forward_m_s - 1.0).abs() < 1e-9, "what is remembered reaches back further");
         assert_eq!(motion.from(10_000 * MS), MOST);

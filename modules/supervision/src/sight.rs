@@ -1,5 +1,7 @@
 //! Whether a scan may be believed.
 
+use core::f64::consts::TAU;
+
 /// One sweep of a range scanner. Beam `i` points to `start_rad + i * step_rad` in the scanner's frame, x forward.
 #[derive(Clone, Copy, Debug)]
 pub struct Scan<'a> {
@@ -15,7 +17,17 @@ pub struct Scan<'a> {
     pub ranges_m: &'a [f32],
 }
 
+/// Beams further apart than this leave room for what a robot must not touch, radians.
+const STEP_MAX_RAD: f64 = 0.1;
+
 impl Scan<'_> {
+    /// Whether the beams are an even fan, close together, of one turn at most.
+    fn is_fan(&self) -> bool {
+        let (step_rad, gaps) = (libm::fabs(self.step_rad), self.ranges_m.len().saturating_sub(1) as f64);
+        let is_turn = step_rad > 0.0 && step_rad <= STEP_MAX_RAD && gaps * step_rad <= TAU + STEP_MAX_RAD;
+        is_turn && self.start_rad.is_finite() && self.range_max_m.is_finite() && self.range_max_m > 0.0
+    }
+
     /// Whether a beam has told anything.
     pub(crate) fn is_reading(range_m: f32) -> bool {
         range_m > 0.0
@@ -34,6 +46,9 @@ pub enum NoSight {
     /// Fewer than half of its beams have a reading.
     #[error("fewer than half of the beams have a reading")]
     Blind,
+    /// Directions or the greatest range are no numbers, or beams are so far apart that a post stands between them.
+    #[error("the scan's directions or range are none that can be used")]
+    Malformed,
     /// The very readings of the last one, while the robot moved.
     #[error("the scanner repeats its readings while the robot moves")]
     Frozen,
@@ -70,6 +85,9 @@ impl Sight {
         if self.is_old(now_ns, scan.taken_ns) {
             return Err(NoSight::Old);
         }
+        if !scan.is_fan() {
+            return Err(NoSight::Malformed);
+        }
         let valid = scan.ranges_m.iter().filter(|range_m| Scan::is_reading(**range_m)).count();
         if valid == 0 || valid * 2 < scan.ranges_m.len() {
             return Err(NoSight::Blind);
@@ -80,6 +98,11 @@ impl Sight {
         let is_frozen = same.is_some_and(|last| moved || last.is_frozen);
         self.last = Some(Last { taken_ns: scan.taken_ns, readings, is_frozen });
         if is_frozen { Err(NoSight::Frozen) } else { Ok(()) }
+    }
+
+    /// A person has looked: the next scan is compared with none.
+    pub fn reset(&mut self) {
+        self.last = None;
     }
 
     /// Whether a scan taken then is too old now.
@@ -120,6 +143,16 @@ mod tests {
         assert_eq!(looked(&mut sight, 451, &scan(150, &[1.5, 2.0]), false), Err(NoSight::Old));
         for blind in [&[][..], &[f32::NAN, 0.0, 1.0], &[-1.0]] {
             assert_eq!(looked(&mut sight, 460, &scan(450, blind), false), Err(NoSight::Blind), "{blind:?}");
+        }
+        let broken = [
+            Scan { step_rad: 0.0, ..scan(450, &[1.0, 2.0]) },
+            Scan { step_rad: 1.5, ..scan(450, &[1.0, 2.0]) },
+            Scan { step_rad: f64::NAN, ..scan(450, &[1.0, 2.0]) },
+            Scan { range_max_m: f64::INFINITY, ..scan(450, &[1.0, 2.0]) },
+            scan(450, &[1.0; 70]),
+        ];
+        for broken in broken {
+            assert_eq!(looked(&mut sight, 460, &broken, false), Err(NoSight::Malformed), "{broken:?}");
         }
         assert_eq!(
             looked(&mut sight, 460, &scan(450, &[8.0, 9.0, 0.0]), false),

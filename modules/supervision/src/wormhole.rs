@@ -182,7 +182,7 @@ impl Wormhole {
     /// When to [`Wormhole::look`] again at the latest; none while nothing is waited for.
     pub fn due_ns(&self) -> Option<u64> {
         let deadline_ns = matches!(self.mode, Mode::Test | Mode::Active).then_some(self.deadline_ns);
-        let wait_ns = self.wait.map(|wait| wait.until_ns);
+        let wait_ns = self.wait.filter(|wait| !wait.has_promised).map(|wait| wait.until_ns);
         deadline_ns.into_iter().chain(wait_ns).min()
     }
 
@@ -260,11 +260,11 @@ impl Wormhole {
         if matches!(self.mode, Mode::Test | Mode::Active) && now_ns >= self.deadline_ns {
             change.control = self.fail(now_ns);
         }
-        if let Some(wait) = self.wait.filter(|wait| now_ns >= wait.until_ns) {
+        let is_over = self.wait.is_some_and(|wait| now_ns >= wait.until_ns && !wait.has_promised);
+        let failed_often = self.wait.is_some() && self.failures > self.settings.failures_before_restart;
+        if is_over || failed_often {
             self.wait = None;
-            if !wait.has_promised || self.failures > self.settings.failures_before_restart {
-                change.restart = self.restart(now_ns);
-            }
+            change.restart = self.restart(now_ns);
         }
         change
     }
@@ -275,11 +275,15 @@ impl Wormhole {
         if self.driver == Driver::Program {
             self.failures = self.failures.saturating_add(1);
             self.count(now_ns);
-            self.wait_anew(now_ns);
+            // A wait that runs is not made longer: each miss would put the restart off.
+            if self.wait.is_none_or(|wait| wait.has_promised) {
+                self.wait_anew(now_ns);
+            }
         }
         lost
     }
 
+    /// Once for each silence: if the program does not come back, that is launch's to see.
     fn restart(&mut self, now_ns: u64) -> Option<u32> {
         self.count(now_ns);
         if self.mode == Mode::Failed {
@@ -287,7 +291,6 @@ impl Wormhole {
         }
         self.mode = Mode::Disabled;
         self.failures = 0;
-        self.wait_anew(now_ns);
         self.program.last.map(|last| last.incarnation)
     }
 
@@ -319,20 +322,35 @@ impl Wormhole {
     /// program is not blamed.
     pub fn set_sight(&mut self, now_ns: u64, sees: bool) -> Change {
         let passed = self.look(now_ns);
+        let has_come = sees && !self.sees;
         self.sees = sees;
         let lost = if sees { None } else { self.stand_by() };
+        if has_come {
+            self.expect_program(now_ns);
+        }
         Change { control: lost.or(passed.control), ..passed }
     }
 
-    /// From now on the promises of this driver count. The other one loses control without blame.
+    /// From now on the promises of this driver count. The one before loses control without blame; so does a person to
+    /// another one, each of which begins with numbers of its own.
     pub fn set_driver(&mut self, now_ns: u64, driver: Driver) -> Change {
         let passed = self.look(now_ns);
-        if driver == self.driver {
+        if driver == Driver::Program && self.driver == Driver::Program {
             return passed;
         }
         let lost = self.stand_by();
         self.driver = driver;
+        self.person = Seat::default();
+        self.expect_program(now_ns);
         Change { control: lost.or(passed.control), ..passed }
+    }
+
+    /// A program that has promised before is to promise again now.
+    fn expect_program(&mut self, now_ns: u64) {
+        let is_its_turn = self.driver == Driver::Program && self.sees && self.mode == Mode::Disabled;
+        if is_its_turn && self.program.last.is_some() {
+            self.wait_anew(now_ns);
+        }
     }
 
     /// Disabled, and nothing is waited for.
@@ -341,34 +359,14 @@ impl Wormhole {
         self.disable()
     }
 
-    /// Launch has begun another run of the program: whatever was to be restarted is gone.
-    pub fn program_began(&mut self, now_ns: u64, incarnation: u32) -> Change {
-        let passed = self.look(now_ns);
-        let order = Order { incarnation, sequence: 0 };
-        let is_known =
-            self.program.last.is_some_and(|last| last.incarnation == incarnation || order.against(last).is_err());
-        if is_known {
-            return passed;
-        }
-        self.program.last = Some(order);
-        if self.driver != Driver::Program {
-            return passed;
-        }
-        let lost = self.disable();
-        if self.wait.is_some() {
-            self.wait_anew(now_ns);
-        }
-        Change { control: lost.or(passed.control), restart: None }
-    }
-
     /// A person has looked: failures are forgotten, and the driver may try again.
-    pub fn reset(&mut self) {
+    pub fn reset(&mut self, now_ns: u64) {
         if self.mode == Mode::Failed {
             self.mode = Mode::Disabled;
         }
         self.failures = 0;
         self.window = Window::default();
-        self.wait = None;
+        self.expect_program(now_ns);
     }
 }
 

@@ -92,13 +92,40 @@ fn a_program_that_does_not_promise_within_the_wait_is_restarted_and_its_next_run
     assert!(rig.restarts.is_empty());
     rig.pass(1);
     assert_eq!(rig.restarts, [1]);
+    rig.pass(100_000);
+    assert_eq!(rig.restarts, [1], "one restart for one silence; whether it begins is launch's to see");
     rig.incarnation = 2;
-    let change = rig.wormhole.program_began(rig.now_ns, 2);
-    assert_eq!(change, Change::default());
-    rig.pass(900);
-    assert_eq!(rig.promise(), Ok(()), "it was told to begin, and has the whole wait for that");
+    assert_eq!(rig.promise(), Ok(()));
     rig.pass(100);
     assert_eq!((rig.promise(), rig.wormhole.mode(), rig.restarts.len()), (Ok(()), Mode::Active, 1));
+}
+
+#[test]
+fn a_program_that_misses_again_and_again_without_control_is_restarted() {
+    let mut rig = Rig::new(Settings { wait_ns: 3000 * MS, ..Settings::default() });
+    for _ in 0..4 {
+        assert_eq!((rig.promise(), rig.restarts.len()), (Ok(()), 0));
+        rig.pass(2000);
+    }
+    assert_eq!(rig.restarts, [1]);
+}
+
+#[test]
+fn a_program_that_hung_while_the_robot_was_blind_or_a_person_drove_is_restarted_after_that() {
+    let mut rig = Rig::active(Settings::default());
+    let change = rig.wormhole.set_sight(rig.now_ns, false);
+    rig.note(change);
+    rig.pass(10_000);
+    assert!(rig.restarts.is_empty(), "it cannot promise");
+    let change = rig.wormhole.set_sight(rig.now_ns, true);
+    rig.note(change);
+    rig.pass(1_000);
+    assert_eq!(rig.restarts, [1]);
+    let mut rig = Rig::active(Settings::default());
+    let _ = rig.wormhole.set_driver(rig.now_ns, Driver::Person);
+    let _ = rig.wormhole.set_driver(rig.now_ns, Driver::Program);
+    rig.pass(1_000);
+    assert_eq!(rig.restarts, [1]);
 }
 
 /// [B1]: three promises, then a missed one, for ever.
@@ -114,7 +141,7 @@ fn a_program_that_fails_again_and_again_is_kept_off_until_a_person_has_looked() 
     assert_eq!((rig.promise(), rig.wormhole.due_ns()), (Err(Refusal::Failed), None), "nothing is waited for");
     rig.pass(100_000);
     assert_eq!(rig.promise(), Err(Refusal::Failed), "time alone heals nothing");
-    rig.wormhole.reset();
+    rig.wormhole.reset(rig.now_ns);
     assert_eq!((rig.promise(), rig.promise(), rig.wormhole.mode()), (Ok(()), Ok(()), Mode::Active));
 }
 
@@ -186,6 +213,10 @@ fn while_a_person_drives_the_program_does_not_and_neither_is_blamed_for_the_chan
         assert_eq!(rig.wormhole.promise(rig.now_ns, 0, Driver::Person, promise).1, Ok(()));
     }
     assert_eq!(rig.wormhole.in_effect(), Some(FORWARD));
+    let change = rig.wormhole.set_driver(rig.now_ns, Driver::Person);
+    assert_eq!((change.control, rig.wormhole.in_effect()), (Some(Control::Off), None), "another person");
+    let promise = Promise { order: Order { incarnation: 3, sequence: 1 }, duration_ns: 200 * MS, command: FORWARD };
+    assert_eq!(rig.wormhole.promise(rig.now_ns, 0, Driver::Person, promise).1, Ok(()), "with numbers of its own");
     rig.pass(5_000);
     assert_eq!(rig.wormhole.in_effect(), None, "a person that lets go stops the robot");
     assert!(rig.restarts.is_empty() && rig.wormhole.failures() == 0);

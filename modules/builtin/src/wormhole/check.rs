@@ -40,8 +40,9 @@ fn of_one(installation: &Installation, document: &Document<'_>, wormhole: &Modul
                 ),
             );
         }
-        if installation.access_against(programs_name(installation, &settings.program), motor).is_none() {
-            let own = classes.name(wormhole.name.class()).unwrap_or_default();
+        let own = wormhole.name.class();
+        if !installation.access.of(motor).is_some_and(|rule| rule.callers == [own].into_iter().collect()) {
+            let own = classes.name(own).unwrap_or_default();
             let line = document.settings_line(wormhole, "motor");
             tell(
                 line,
@@ -55,6 +56,17 @@ fn of_one(installation: &Installation, document: &Document<'_>, wormhole: &Modul
     if !has_class(installation, wormhole, MotorInterface::CLASS) {
         let line = wormhole.line;
         tell(line, "it has no name of class `motor` that programs command; add one to `aliases`".into());
+    }
+    let laser = classes.parse_module(&settings.laser).ok().and_then(|laser| installation.module(laser));
+    if let Some(laser) = laser.filter(|laser| laser.node != wormhole.node) {
+        let line = document.settings_line(wormhole, "laser");
+        tell(
+            line,
+            format!(
+                "`{}` is on node {}, whose clock says nothing here of a scan's age; put both on one node",
+                settings.laser, laser.node
+            ),
+        );
     }
     let line = document.settings_line(wormhole, "program");
     match classes.parse_module(&settings.program).ok().and_then(|program| installation.module(program)) {
@@ -74,11 +86,6 @@ fn of_one(installation: &Installation, document: &Document<'_>, wormhole: &Modul
     problems
 }
 
-/// A name that a command of the program would come from.
-fn programs_name(installation: &Installation, program: &str) -> Name {
-    installation.classes.parse_module(program).unwrap_or(Name::from_raw(0)).with_local(rohrpost_mailbox::local::REPLIES)
-}
-
 /// Modules that command the motor themselves, with their line.
 fn callers_past<'a>(
     installation: &'a Installation,
@@ -88,4 +95,41 @@ fn callers_past<'a>(
     let others = installation.modules.iter().filter(|module| module.name != wormhole.name);
     let commands = others.filter(move |module| module.calls.contains(&motor) && !module.downwards.subscribes(motor));
     commands.map(|module| (module, module.line))
+}
+
+#[cfg(test)]
+mod tests {
+    use rohrpost_config::Installation;
+
+    const FILE: &str = include_str!("../../../../config/demo-supervised.toml");
+
+    /// What is told of the demo's file with one change.
+    fn told(old: &str, new: &str) -> Vec<String> {
+        assert!(FILE.contains(old), "{old}");
+        let text = FILE.replacen(old, new, 1);
+        let installation =
+            Installation::parse(&text, "robot.toml".as_ref()).unwrap_or_else(|errors| panic!("{errors}"));
+        crate::check(&installation).into_iter().map(|problem| problem.message).collect()
+    }
+
+    #[test]
+    fn what_would_keep_a_wormhole_from_its_work_is_told() {
+        assert_eq!(told("lag-ms = 50", "lag-ms = 60"), [""; 0]);
+        for (old, new, words) in [
+            ("\"motor.1\" = [\"wormhole\"]", "\"motor.1\" = [\"wormhole\", \"tool\"]", "others may command `motor.1`"),
+            ("[\"pilot\", \"tool\"]\n\"motor.1\" = [\"wormhole\"]", "[\"pilot\", \"wormhole\"]", "into [access]"),
+            ("wormhole = { id = 210", "wormhole = { id = 130", "give class `wormhole` a higher one"),
+            (
+                "[nodes.main]",
+                "[nodes.main]\n[time]\nsource = \"simulation\"",
+                "its deadlines go by the computer's clock",
+            ),
+            ("program = \"pilot.0\"", "program = \"pilot.7\"", "`program` is `pilot.7`, which no [[module]] defines"),
+            ("aliases = [\"motor.0\"]", "", "no name of class `motor`"),
+            ("radius-m = 0.25", "radius-m = 0", "`radius-m` is 0"),
+        ] {
+            let problems = told(old, new);
+            assert!(problems.iter().any(|problem| problem.contains(words)), "{words}: {problems:#?}");
+        }
+    }
 }

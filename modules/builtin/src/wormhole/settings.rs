@@ -5,6 +5,7 @@ use rohrpost_modules::interface::Interface;
 use rohrpost_modules::interfaces::{LaserInterface, MotorInterface};
 use rohrpost_supervision::{Limits, Mounting, Settings as Times};
 use serde::Deserialize;
+use std::time::Duration;
 
 const MILLISECOND_NS: u64 = 1_000_000;
 
@@ -54,7 +55,7 @@ pub(crate) struct Settings {
     horizon_ms: u32,
     /// After control was lost, the program has so long to promise again.
     #[serde(default = "wait_ms")]
-    wait_ms: u32,
+    pub(super) wait_ms: u32,
     #[serde(default = "failures_before_restart")]
     failures_before_restart: u32,
     /// So many failures and restarts within `window-s` need a person.
@@ -133,6 +134,11 @@ impl Settings {
         }
     }
 
+    /// From a command being sent until the motor obeys.
+    pub(super) fn lag(&self) -> Duration {
+        Duration::from_millis(self.lag_ms.into())
+    }
+
     pub(super) fn promise_ns(&self) -> u64 {
         u64::from(self.promise_ms) * MILLISECOND_NS
     }
@@ -159,8 +165,8 @@ impl settings::Settings for Settings {
             ("laser-x-m", self.laser_x_m, -self.radius_m, self.radius_m),
             ("laser-y-m", self.laser_y_m, -self.radius_m, self.radius_m),
             ("laser-heading-rad", self.laser_heading_rad, -7.0, 7.0),
-            ("lag-ms", self.lag_ms.into(), 0.0, 5000.0),
-            ("scan-age-max-ms", self.scan_age_max_ms.into(), 10.0, 10_000.0),
+            ("lag-ms", self.lag_ms.into(), 5.0, 1000.0),
+            ("scan-age-max-ms", self.scan_age_max_ms.into(), 10.0, 1000.0),
             ("look-ms", self.look_ms.into(), 1.0, 1000.0),
             ("late-ms", self.late_ms.into(), 0.0, 1000.0),
             ("horizon-ms", self.horizon_ms.into(), 10.0, 60_000.0),

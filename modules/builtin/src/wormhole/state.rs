@@ -91,6 +91,9 @@ impl Told {
         let mut names: Vec<String> = wormhole.halts.held().map(|halt| self.name(Name::from_raw(halt.by))).collect();
         names.sort();
         names.dedup();
+        if wormhole.halts.has_unnamed() {
+            names.push("more callers than have names here".into());
+        }
         names
     }
 

@@ -12,7 +12,7 @@ use rohrpost_modules::common;
 use rohrpost_modules::interface::{Interface, Serve};
 use rohrpost_modules::launch_support::{Cause, Command, CommandHandler, CommandServer, Refusals, admit};
 use rohrpost_schema::Description;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Commands taken in one go: a flood of them must not keep launch from its modules.
 const BURST: usize = 32;
@@ -196,6 +196,11 @@ impl Launcher for Orders<'_> {
         let epoch = self.time.begin_epoch().ok_or(ControlError::OtherTime)?;
         self.notes.push(format!("epoch {epoch} of time begins at this computer's clock, as asked"));
         Ok(epoch)
+    }
+
+    fn end_failing(&mut self, module: String, cause: String, ran_for_ms: u32) -> Result<bool, ControlError> {
+        let (node, ran_for) = (self.node, Duration::from_millis(ran_for_ms.into()));
+        Ok(self.find(&module)?.end_failing(&cause, ran_for, node, Instant::now()))
     }
 
     fn look_on(&mut self, look: u32, from: u32, bytes_max: u16) -> Result<LookPage, LookError> {

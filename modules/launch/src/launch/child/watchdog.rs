@@ -4,7 +4,7 @@ use super::ending::{ChildShutdown, EndCause};
 use super::{Child, Phase};
 use crate::launch::silence::{Hang, Look, Silence, Verdict};
 use crate::survey::{Working, is_stopped};
-use rohrpost_mailbox::{ClassTraffic, Loss, MailboxInfo, Node, local, monotonic_ns, saturating_sum};
+use rohrpost_mailbox::{ClassTraffic, Loss, MailboxInfo, ModuleState, Node, local, monotonic_ns, saturating_sum};
 use std::time::{Duration, Instant};
 
 impl Child {
@@ -29,13 +29,27 @@ impl Child {
             }
             Verdict::Hangs(hang) => {
                 let cause = self.told(hang, look.is_stopped, node);
-                let grace = self.watchdog.map_or(Duration::ZERO, |watchdog| watchdog.grace);
-                self.process.iter_mut().for_each(|process| process.terminate(node));
-                self.phase = Phase::Stopping;
-                self.ending = Some(ChildShutdown::begin(EndCause::Hang(cause), grace, now));
+                self.end_hung(cause, node, now);
                 self.press(node, now)
             }
         }
+    }
+
+    /// Ends it for a cause that others know, if it is on and has run for so long; whether it was.
+    pub(in crate::launch) fn end_failing(&mut self, cause: &str, ran_for: Duration, node: &Node, now: Instant) -> bool {
+        let is_on = self.phase == Phase::Running && self.state_of(node) == Some(ModuleState::On);
+        let is_meant = is_on && now.saturating_duration_since(self.since) >= ran_for;
+        if is_meant {
+            self.end_hung(cause.to_owned(), node, now);
+        }
+        is_meant
+    }
+
+    fn end_hung(&mut self, cause: String, node: &Node, now: Instant) {
+        let grace = self.watchdog.map_or(Duration::ZERO, |watchdog| watchdog.grace);
+        self.process.iter_mut().for_each(|process| process.terminate(node));
+        self.phase = Phase::Stopping;
+        self.ending = Some(ChildShutdown::begin(EndCause::Hang(cause), grace, now));
     }
 
     fn look(&self, node: &Node) -> Look {
