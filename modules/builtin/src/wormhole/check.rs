@@ -103,10 +103,12 @@ mod tests {
 
     const FILE: &str = include_str!("../../../../config/demo-supervised.toml");
 
-    /// What is told of the demo's file with one change.
-    fn told(old: &str, new: &str) -> Vec<String> {
-        assert!(FILE.contains(old), "{old}");
-        let text = FILE.replacen(old, new, 1);
+    /// What is told of the demo's file with some changes.
+    fn told(changes: &[(&str, &str)]) -> Vec<String> {
+        let text = changes.iter().fold(FILE.to_owned(), |text, (old, new)| {
+            assert!(text.contains(old), "{old}");
+            text.replacen(old, new, 1)
+        });
         let installation =
             Installation::parse(&text, "robot.toml".as_ref()).unwrap_or_else(|errors| panic!("{errors}"));
         crate::check(&installation).into_iter().map(|problem| problem.message).collect()
@@ -114,22 +116,36 @@ mod tests {
 
     #[test]
     fn what_would_keep_a_wormhole_from_its_work_is_told() {
-        assert_eq!(told("lag-ms = 50", "lag-ms = 60"), [""; 0]);
-        for (old, new, words) in [
-            ("\"motor.1\" = [\"wormhole\"]", "\"motor.1\" = [\"wormhole\", \"tool\"]", "others may command `motor.1`"),
-            ("[\"pilot\", \"tool\"]\n\"motor.1\" = [\"wormhole\"]", "[\"pilot\", \"wormhole\"]", "into [access]"),
-            ("wormhole = { id = 210", "wormhole = { id = 130", "give class `wormhole` a higher one"),
+        assert_eq!(told(&[("lag-ms = 50", "lag-ms = 60")]), [""; 0]);
+        let motor = "\"motor.1\" = [\"wormhole\"]";
+        let cases: [(&[(&str, &str)], &str); 8] = [
+            (&[(motor, "\"motor.1\" = [\"wormhole\", \"tool\"]")], "others may command `motor.1`"),
+            (&[(motor, ""), ("[\"pilot\", \"tool\"]", "[\"pilot\", \"wormhole\"]")], "into [access]"),
             (
-                "[nodes.main]",
-                "[nodes.main]\n[time]\nsource = \"simulation\"",
-                "its deadlines go by the computer's clock",
+                &[("wormhole = { id = 210", "wormhole = { id = 130"), ("\"motor.0\"]\nsettings", CALLS_BELOW)],
+                "give class `wormhole` a higher one",
             ),
-            ("program = \"pilot.0\"", "program = \"pilot.7\"", "`program` is `pilot.7`, which no [[module]] defines"),
-            ("aliases = [\"motor.0\"]", "", "no name of class `motor`"),
-            ("radius-m = 0.25", "radius-m = 0", "`radius-m` is 0"),
-        ] {
-            let problems = told(old, new);
+            (&[("[nodes.main]", "[nodes.main]\n[time]\nsource = \"simulation\"")], "go by the computer's clock"),
+            (&[("program = \"pilot.0\"", "program = \"pilot.7\"")], "`pilot.7`, which no [[module]] defines"),
+            (
+                &[("aliases = [\"motor.0\"]", ""), ("[\"laser.0\", \"motor.0\"]", "[\"laser.0\"]")],
+                "no name of class `motor`",
+            ),
+            (&[("radius-m = 0.25", "radius-m = 0")], "`radius-m` is 0"),
+            (
+                &[("id = 140", "id = 230"), (motor, "\"motor.1\" = [\"wormhole\", \"pilot\"]"), PAST],
+                "`pilot.0` calls `motor.1` past it",
+            ),
+        ];
+        for (changes, words) in cases {
+            let problems = told(changes);
             assert!(problems.iter().any(|problem| problem.contains(words)), "{words}: {problems:#?}");
         }
     }
+
+    const CALLS_BELOW: &str = "{ to = \"motor.0\", although = \"it waits\" }]\nsettings";
+    const PAST: (&str, &str) = (
+        "calls = [\"laser.0\", \"motor.0\"]",
+        "calls = [{ to = \"laser.0\", subscribes = true }, { to = \"motor.1\", although = \"it waits\" }]",
+    );
 }
