@@ -235,9 +235,9 @@ pub trait Launcher {
     #[command(22)]
     fn new_epoch(&mut self) -> Result<u64, ControlError>;
 
-    /// Ends a module that does not do its work, as its watchdog would: a failure that its restart policy counts. Only if
-    /// it is on, in a process that has run for so long at least, ms; whether it was. One that was stopped, switched off,
-    /// or started again meanwhile is left alone.
+    /// Ends a module that does not do its work, as its watchdog would: a failure that its restart policy counts. Only
+    /// if it is on, in a process that has run for so long at least, ms; whether it was. One that was stopped, switched
+    /// off, or started again meanwhile is left alone.
     #[command(23)]
     fn end_failing(&mut self, module: String, cause: String, ran_for_ms: u32) -> Result<bool, ControlError>;
 }

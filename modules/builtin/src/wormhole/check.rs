@@ -63,7 +63,7 @@ fn of_one(installation: &Installation, document: &Document<'_>, wormhole: &Modul
         tell(
             line,
             format!(
-                "`{}` is on node {}, whose clock says nothing here of a scan's age; put both on one node",
+                "`{}` is on node {}, and its clock says nothing here of a scan's age; put both on one node",
                 settings.laser, laser.node
             ),
         );
