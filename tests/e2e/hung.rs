@@ -171,17 +171,22 @@ fn a_module_that_waits_and_one_with_a_long_but_allowed_turn_are_let_alone() {
 
 #[test]
 fn a_launch_that_was_stopped_itself_blames_no_module() {
-    let limit = Duration::from_secs(1);
-    let (_place, mut launch, robot) = Place::running(&[&spinner(10, "watchdog = \"1 s\"")]);
+    let limit = Duration::from_secs(2);
+    let (place, mut launch, robot) = Place::running(&[&spinner(10, "watchdog = \"2 s\"")]);
     let pid = robot.pid("probe.0");
+    // A turn that is allowed, and in which both are stopped for longer than that.
+    spin(&place, 600);
+    until("the turn has begun", || !place.path("spin").exists());
     for process in [launch.pid(), pid] {
         halt(process);
     }
     pass(2 * limit);
-    for process in [pid, launch.pid()] {
+    // Launch looks first, and finds the module in a turn of more than four seconds.
+    for process in [launch.pid(), pid] {
         signal(process, Signal::SIGCONT);
     }
-    pass(limit);
+    until("the turn is over", || place.path("spin.done").exists());
+    pass(limit / 2);
     assert_eq!(robot.pid("probe.0"), pid);
     let out = launch.stop();
     assert!(!out.contains("hung"), "{out}");

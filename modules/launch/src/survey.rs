@@ -369,6 +369,12 @@ pub(crate) fn is_stopped(pid: u32) -> bool {
     stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with(['T', 't']))
 }
 
+/// Whether the kernel writes a core dump of it (`CoreDumping` in proc_pid_status(5)).
+pub(crate) fn is_dumping_core(pid: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+    status.lines().any(|line| line.split_whitespace().eq(["CoreDumping:", "1"]))
+}
+
 /// What a mailbox is for, by its local id.
 pub fn purpose(local: u8) -> &'static str {
     match local {

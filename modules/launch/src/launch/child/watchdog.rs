@@ -3,7 +3,7 @@
 use super::ending::{ChildShutdown, EndCause};
 use super::{Child, Phase};
 use crate::launch::silence::{Hang, Look, Silence, Verdict};
-use crate::survey::{Working, is_stopped};
+use crate::survey::{Working, is_dumping_core, is_stopped};
 use rohrpost_mailbox::{ClassTraffic, Loss, MailboxInfo, ModuleState, Node, local, monotonic_ns, saturating_sum};
 use std::time::{Duration, Instant};
 
@@ -18,6 +18,12 @@ impl Child {
     pub(super) fn end_if_it_hangs(&mut self, node: &Node, now: Instant) -> Option<String> {
         let now_ns = monotonic_ns();
         if self.watch.as_ref()?.look_at_ns() > now_ns {
+            return None;
+        }
+        // One that ends in order takes nothing more. A crash is no hang: the kernel may still write what it leaves, and
+        // the end comes by itself.
+        let word = self.last_word(node);
+        if word.is_none_or(|word| word.state == Some(ModuleState::Stopping) || is_dumping_core(word.pid)) {
             return None;
         }
         let look = self.look(node);
