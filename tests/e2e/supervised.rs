@@ -4,7 +4,6 @@ use crate::harness::{PATIENCE, Place, halt, repository, signal, wait};
 use crate::process::Running;
 use crate::robot::Robot;
 use nix::sys::signal::Signal;
-use rohrpost::interface::Interface;
 use rohrpost::interfaces::{ControlRefusal, SupervisorInterface, WheelsInterface};
 use rohrpost::types::{Odometry, Twist};
 use rohrpost::wire::{append, from_bytes};
