@@ -44,6 +44,14 @@ impl ChildShutdown {
         Self { cause, since: now, within, killed: None, left_behind: false }
     }
 
+    /// Somebody wants its end now: one that hangs has no more time from here on than any other that is told to end.
+    fn wanted(&mut self, then: Then, stop_within: Duration, now: Instant) {
+        if matches!(self.cause, EndCause::Hang(_)) {
+            self.within = self.within.min(now.saturating_duration_since(self.since) + stop_within);
+        }
+        self.cause = EndCause::Told(then);
+    }
+
     /// When there is something to do about it, if it has not ended by then.
     pub(super) fn press_at(&self) -> Option<Instant> {
         match self.killed {
@@ -83,7 +91,7 @@ impl Child {
             self.repeats = Repeats::default();
         }
         if let Some(ending) = &mut self.ending {
-            ending.cause = EndCause::Told(then);
+            ending.wanted(then, self.stop_within, now);
             return;
         }
         self.note_switch(node);
