@@ -6,7 +6,7 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use rohrpost_modules::types::{LaserScan, Twist};
+use rohrpost_modules::types::{LaserScan, Pose, Twist};
 use rohrpost_robot::simulator::{STEP_NS, Scanner, Settings as RobotSettings, Simulator};
 use rohrpost_robot::world::World;
 use rohrpost_supervision::{Command, Envelope, Limits, Motion, Mounting, Scan, Sight, Verdict};
@@ -32,6 +32,7 @@ struct Trial {
     random: ChaCha8Rng,
     robot: Simulator,
     limits: Limits,
+    mounting: Mounting,
     motion: Motion,
     sight: Sight,
     scan_period_ns: u64,
@@ -73,9 +74,17 @@ impl Trial {
     fn new(seed: u64, is_supervised: bool) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let sees_all_around = random.random_bool(0.5);
+        let mut at = |least: f64, most: f64| random.random_range(least..most);
+        let mounting = if sees_all_around {
+            Mounting { x_m: at(-0.15, 0.15), y_m: at(-0.15, 0.15), heading_rad: at(-PI, PI) }
+        } else {
+            Mounting { x_m: at(-0.05, 0.0), y_m: 0.0, heading_rad: 0.0 }
+        };
         let scanner = Scanner {
             beams: if sees_all_around { 360 } else { 181 },
             field_of_view_rad: if sees_all_around { TAU } else { PI },
+            range_max_m: at(1.5, 8.0),
+            mounting: Pose { x_m: mounting.x_m, y_m: mounting.y_m, heading_rad: mounting.heading_rad },
             ..Scanner::default()
         };
         let robot = RobotSettings {
@@ -105,6 +114,7 @@ impl Trial {
             scan_delay_ns: random.random_range(0..15) * STEP_NS,
             look_ns: ((limits.look_s * 1e9) as u64 / STEP_NS).max(1) * STEP_NS,
             limits,
+            mounting,
             random,
             to_motor: VecDeque::new(),
             to_wormhole: VecDeque::new(),
@@ -175,7 +185,7 @@ impl Trial {
         else {
             return Command::STOP;
         };
-        let envelope = Envelope::new(self.limits, Mounting::default());
+        let envelope = Envelope::new(self.limits, self.mounting);
         let verdict = envelope.check(now_ns, self.wanted, &seen(*taken_ns, scan), &self.motion);
         if self.wanted.speed_m_s != 0.0 {
             self.outcome.checked += 1;
