@@ -243,7 +243,8 @@ impl WormholeModule {
         self.follow(change);
         // A flood of promises is no flood of commands: those that come in between are looked at a little later.
         let next_look_ns = self.last_look_ns.map_or(0, |last_ns| last_ns + LOOK_MIN_NS);
-        if taken.is_ok() && now_ns >= next_look_ns {
+        let is_lost = change.control == Some(Control::Off);
+        if is_lost || taken.is_ok() && now_ns >= next_look_ns {
             self.look();
         } else {
             let later_ns = taken.is_ok().then_some(next_look_ns);
