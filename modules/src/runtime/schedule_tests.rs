@@ -49,7 +49,7 @@ impl Ground {
 
     fn schedule(&self) -> Schedule {
         let clock = SystemClock::open(&self.node);
-        let mut schedule = Schedule { seen: seen(&clock), node: Some(clock), ticks: None };
+        let mut schedule = Schedule { seen: seen(&clock), node: Some(clock), ticks: None, wake_up: WakeUp::default() };
         schedule.set_period(PERIOD);
         schedule
     }
@@ -124,7 +124,7 @@ fn ticks_begin_with_the_nodes_time() {
     let node = Node::create(&directory.path().join("node"), 0o700).unwrap();
     let waits = TimeKeeper::await_source(&node, Source::Log).unwrap();
     let clock = SystemClock::open(&node);
-    let mut schedule = Schedule { seen: seen(&clock), node: Some(clock), ticks: None };
+    let mut schedule = Schedule { seen: seen(&clock), node: Some(clock), ticks: None, wake_up: WakeUp::default() };
     schedule.set_period(PERIOD);
     assert_eq!(ticks(&mut schedule), 0);
     drop(waits);
@@ -178,4 +178,18 @@ fn only_simulated_and_replayed_time_is_followed() {
         let moment = Schedule::new(&installation, &clock).moment();
         assert_eq!(moment.work_ns == 1000 * MS, follows, "{time}");
     }
+}
+
+#[test]
+fn a_tick_that_is_asked_for_comes_once_and_at_its_moment() {
+    let mut schedule = Schedule { node: None, seen: (0, 0), ticks: None, wake_up: WakeUp::default() };
+    let moment = |monotonic_ns| WorkMoment { monotonic_ns, work_ns: monotonic_ns };
+    let wake_up = schedule.wake_up();
+    assert!(!schedule.take_tick(moment(1)));
+    wake_up.at(Some(10));
+    assert_eq!((schedule.wake_up_ns(), schedule.take_tick(moment(9))), (Some(10), false));
+    assert_eq!((schedule.take_tick(moment(10)), schedule.take_tick(moment(11))), (true, false));
+    wake_up.at(Some(20));
+    wake_up.at(None);
+    assert!(!schedule.take_tick(moment(30)));
 }
