@@ -40,11 +40,8 @@ pub enum DriveError {
     #[error("speed and turn rate must be finite numbers")]
     NotFinite,
     /// The hardware does not answer.
-    #[error("the motor does not answer: {0}")]
+    #[error("the motor does not obey: {0}")]
     Hardware(String),
-    /// What stands between the caller and the motor does not let it through.
-    #[error("the command is refused: {0}")]
-    Refused(String),
 }
 
 /// Drives a robot in the plane.

@@ -279,7 +279,7 @@ impl WormholeModule {
 
 impl Motor for WormholeModule {
     fn drive(&mut self, speed_m_s: f64, turn_rate_rad_s: f64) -> Result<(), DriveError> {
-        self.take(self.settings.promise_ns(), speed_m_s, turn_rate_rad_s).map_err(DriveError::Refused)
+        self.take(self.settings.promise_ns(), speed_m_s, turn_rate_rad_s).map_err(DriveError::Hardware)
     }
 
     /// A promise to stand.

@@ -147,6 +147,6 @@ mod tests {
         for (code, (tag, _)) in (1..).zip(ALL) {
             assert_eq!((tag as u8, Tag::from_code(code)), (code, Some(tag)));
         }
-        assert_eq!((Tag::from_code(0), Tag::from_code(38)), (None, None));
+        assert_eq!((Tag::from_code(0), Tag::from_code(40)), (None, None));
     }
 }
