@@ -137,7 +137,7 @@ fn a_robot_of_which_nothing_is_known_may_be_as_fast_as_it_can() {
     assert!(passes((0.3, 0.0), &wall));
 }
 
-/// It rolls out in the turn: into the wall beside it.
+/// The robot rolls out in the turn: into the wall beside it.
 #[test]
 fn a_robot_that_still_rolls_turns_only_where_there_is_room_for_that() {
     let limits = limits();

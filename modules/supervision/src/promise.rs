@@ -50,7 +50,7 @@ pub enum Refusal {
     /// A repetition, or one that came behind a newer one.
     #[error("this promise is not newer than the last one")]
     OldSequence,
-    /// Its time was over when it came.
+    /// Late: the promise's time was over when it came.
     #[error("the promise came after its own deadline")]
     Late,
     /// Without a scan that can be believed nobody drives.

@@ -67,7 +67,7 @@ impl Way {
         }
     }
 
-    /// It does not roll this way at all, but for the command.
+    /// Whether the robot does not roll this way at all, but for the command.
     pub(crate) fn is_none(&self) -> bool {
         self.before_m == 0.0 && self.slowing_m_s == 0.0
     }

@@ -12,7 +12,7 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// It happened now.
+    /// One more, now.
     pub(crate) fn push(&mut self, now_ns: u64) {
         self.at_ns[self.next] = Some(now_ns);
         self.next = (self.next + 1) % REMEMBERED;

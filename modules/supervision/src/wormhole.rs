@@ -75,9 +75,9 @@ pub enum Driver {
 /// What the driver is to be told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {
-    /// It has control from now on.
+    /// The driver has control from now on.
     On,
-    /// It has lost control.
+    /// The driver has lost control.
     Off,
 }
 

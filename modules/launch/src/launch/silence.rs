@@ -21,7 +21,7 @@ use std::time::Duration;
 pub(super) struct Look {
     /// The part of its own code that runs.
     pub(super) in_hand: Option<InHand>,
-    /// Its process is stopped, by SIGSTOP say.
+    /// Whether the process is stopped, by SIGSTOP say.
     pub(super) is_stopped: bool,
     /// If packages wait for it: how many it has taken so far.
     pub(super) taken: Option<u64>,
@@ -32,9 +32,9 @@ pub(super) struct Look {
 pub(super) enum Silence {
     /// A part of its code.
     Turn(InHand),
-    /// Its process is stopped between two turns.
+    /// A process that is stopped between two turns.
     Stopped,
-    /// It has taken so many packages, and more wait.
+    /// So many packages taken, and more that wait.
     Waiting(u64),
 }
 
@@ -51,9 +51,9 @@ pub(super) struct Hang {
 pub(super) enum Verdict {
     /// Nothing.
     Fine,
-    /// It is to be woken: perhaps it sleeps beside waiting packages, since their sender was stopped before it rang.
+    /// The module is to be woken: perhaps it sleeps beside waiting packages, since their sender was stopped before it rang.
     Wake,
-    /// It is to be ended.
+    /// The module is to be ended.
     Hangs(Hang),
 }
 

@@ -21,7 +21,7 @@ pub(in crate::launch) enum Then {
 pub(super) enum EndCause {
     /// Somebody wants it so.
     Told(Then),
-    /// It hangs, in these words. Its restart policy says what becomes of it.
+    /// A hang, in these words. Its restart policy says what becomes of it.
     Hang(String),
 }
 
@@ -30,7 +30,7 @@ pub(super) struct ChildShutdown {
     pub(super) cause: EndCause,
     /// When it was told.
     since: Instant,
-    /// It is killed after this time.
+    /// Time after which the process is killed.
     within: Duration,
     /// When it was killed, since it did not obey.
     pub(super) killed: Option<Instant>,
