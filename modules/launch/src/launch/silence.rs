@@ -51,7 +51,7 @@ pub(super) struct Hang {
 pub(super) enum Verdict {
     /// Nothing.
     Fine,
-    /// The module is to be woken: perhaps it sleeps beside waiting packages, since their sender was stopped before it rang.
+    /// To be woken: perhaps it sleeps beside waiting packages, since their sender was stopped before it rang.
     Wake,
     /// The module is to be ended.
     Hangs(Hang),
