@@ -32,7 +32,7 @@ const DOUBLED: [(&str, &str); 7] = [
 ];
 
 /// Our tools, or crates that only tools need.
-const NOT_FOR_MODULES: [&str; 20] = [
+const NOT_FOR_MODULES: [&str; 22] = [
     "clap",
     "comfy-table",
     "flate2",
@@ -46,11 +46,13 @@ const NOT_FOR_MODULES: [&str; 20] = [
     "rohrpost-bench",
     "rohrpost-bench-local",
     "rohrpost-builtin",
+    "rohrpost-bundle",
     "rohrpost-launch",
     "rohrpost-native",
     "rohrpost-recording",
     "rohrpost-robot",
     "rohrpost-router-daemon",
+    "rohrpost-team",
     "rustls",
     "serde_json",
 ];
@@ -147,6 +149,8 @@ fn demo_build_example_and_test_compile_no_crate_twice() {
                 "--exclude=rohrpost-gui-bridge",
                 "--exclude=rohrpost-bench",
                 "--exclude=rohrpost-proof-loom",
+                "--exclude=rohrpost-proof-supervision",
+                "--exclude=rohrpost-proof-team",
             ],
         ),
     ] {

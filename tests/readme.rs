@@ -66,13 +66,12 @@ fn is_name_of_a_test(word: &str) -> bool {
     word.contains('_') && word.chars().all(|c| c == '_' || c.is_ascii_lowercase() || c.is_ascii_digit())
 }
 
-/// Tables of the book that name the test of each row: the last column of those with this heading.
-#[test]
-fn each_promise_of_security_names_tests_that_there_are() {
-    let (page, sources) = (text("docs/src/security.md"), sources());
+/// Tables of a page of the book that name the test of each row: the last column of those with this heading.
+#[track_caller]
+fn check_named_tests(page: &str, sources: &str, tables_expected: usize) {
     let mut tables = 0;
     let mut is_of_tests = false;
-    for line in page.lines() {
+    for line in text(page).lines() {
         let Some(row) = line.strip_prefix("| ").and_then(|line| line.strip_suffix(" |")) else {
             is_of_tests = false;
             continue;
@@ -82,19 +81,36 @@ fn each_promise_of_security_names_tests_that_there_are() {
             (is_of_tests, tables) = (true, tables + 1);
         } else if is_of_tests && !last.starts_with("---") {
             let named: Vec<&str> = last.split('`').skip(1).step_by(2).collect();
-            assert!(!named.is_empty(), "docs/src/security.md names no test: {row}");
+            assert!(!named.is_empty(), "{page} names no test: {row}");
             for test in named {
-                assert!(is_name_of_a_test(test), "docs/src/security.md: `{test}` is no name of a test: {row}");
+                assert!(is_name_of_a_test(test), "{page}: `{test}` is no name of a test: {row}");
                 let before = sources.split(&format!("fn {test}(")).next().filter(|before| before.len() < sources.len());
                 let attributes = before.and_then(|before| before.rsplit("\n\n").next()).unwrap_or_default();
                 // Some are called by a test that checks whether mistakes make them fail.
                 let is_run =
                     attributes.contains("#[test]") || before.is_some() && sources.contains(&format!("::{test},"));
-                assert!(is_run, "docs/src/security.md names the test `{test}`, and there is none: {row}");
+                assert!(is_run, "{page} names the test `{test}`, and there is none: {row}");
             }
         }
     }
-    assert_eq!(tables, 3, "the shares, the promises, and those of time slots");
+    assert_eq!(tables, tables_expected, "tables of {page} that name tests");
+}
+
+#[test]
+fn each_promise_names_tests_that_there_are() {
+    let sources = sources();
+    // The shares, the promises, and those of time slots.
+    check_named_tests("docs/src/security.md", &sources, 3);
+    check_named_tests("docs/src/why.md", &sources, 1);
+}
+
+/// The names by which links find the headings of a page, as mdBook makes them.
+fn anchors(page: &str) -> BTreeSet<String> {
+    let outside_of_blocks = page.split("\n```").step_by(2).flat_map(str::lines);
+    let headings =
+        outside_of_blocks.filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let of_a_name = |c: &char| c.is_alphanumeric() || ['_', '-', ' '].contains(c);
+    headings.map(|text| text.to_lowercase().chars().filter(of_a_name).collect::<String>().replace(' ', "-")).collect()
 }
 
 #[test]
@@ -104,10 +120,14 @@ fn links_between_pages_lead_somewhere() {
     let pages = book.chain(["README.md", "ARCHITECTURE.md", "CHANGELOG.md"].map(|name| root.join(name)));
     for page in pages.filter(|page| page.extension().is_some_and(|extension| extension == "md")) {
         let text = fs::read_to_string(&page).unwrap();
-        for target in text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next()) {
-            let local = !target.is_empty() && !target.contains("://");
-            let there = !local || page.parent().unwrap().join(target).exists();
-            assert!(there, "{} links {target}, which does not exist", page.display());
+        let links = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        for link in links.filter(|link| !link.contains("://")) {
+            let (file, anchor) = link.split_once('#').map_or((link, None), |(file, anchor)| (file, Some(anchor)));
+            let target = if file.is_empty() { page.clone() } else { page.parent().unwrap().join(file) };
+            assert!(target.exists(), "{} links {link}, which does not exist", page.display());
+            let Some(anchor) = anchor else { continue };
+            let known = anchors(&fs::read_to_string(target).unwrap());
+            assert!(known.contains(anchor), "{} links {link}, and there is no such heading: {known:?}", page.display());
         }
     }
 }

@@ -2,7 +2,8 @@
 //! used.
 //!
 //! Harness, rounds, statistics and table are those of `rohrpost_bench_local`. Here are the cases, and how contenders
-//! send: ours in `streams`, `one_way`, `lan`, `tdma` and `tcp`, then `floors`, `peers`, and programs in `foreign`.
+//! send: ours in `streams`, `one_way`, `lan`, `tdma`, `tcp` and `team`, then `floors`, `peers`, and programs in
+//! `foreign`.
 //!
 //! A case is added in `cases`: a name, and what measures its rows.
 
@@ -19,3 +20,4 @@ pub mod player;
 pub mod streams;
 pub mod tcp;
 pub mod tdma;
+pub mod team;

@@ -1,4 +1,5 @@
-//! `cargo run --release -p rohrpost-bench -- local`, `streams`, `recording`, `lan`, `tdma`, `tcp` or `languages`.
+//! `cargo run --release -p rohrpost-bench -- local`, `streams`, `recording`, `lan`, `tdma`, `tcp`, `supervision`,
+//! `grid`, `plan`, `team` or `languages`.
 
 use clap::{Parser, Subcommand};
 use rohrpost_bench::cases;
@@ -34,6 +35,14 @@ enum Command {
     Tdma(Run),
     /// Packages between systems, over the TCP router: the loopback device.
     Tcp(Run),
+    /// Supervised control: the wormhole between a program and its motor, and watchdogs.
+    Supervision(Run),
+    /// Paths on the grids of teams, beside a search in C++.
+    Grid(Run),
+    /// Ways for 64 robots at once: time and steps.
+    Plan(Run),
+    /// Teams of robots: hellos, views, merges in virtual time, and routers of two network namespaces.
+    Team(Run),
     /// Programs in C and in Python, beside the same in Rust.
     Languages {
         #[command(flatten)]
@@ -77,7 +86,7 @@ fn main() -> ExitCode {
 
 /// False when a contender failed.
 fn measure(command: Command) -> Result<bool, Failure> {
-    if matches!(command, Command::Lan(_) | Command::Tdma(_)) {
+    if matches!(command, Command::Lan(_) | Command::Tdma(_) | Command::Team(_)) {
         rohrpost_bench::lan::prepare();
     }
     match command {
@@ -87,6 +96,10 @@ fn measure(command: Command) -> Result<bool, Failure> {
         Command::Lan(run) => run.measure(&run.settings(), &cases::lan::all()),
         Command::Tdma(run) => run.measure(&run.settings(), &cases::tdma::all()),
         Command::Tcp(run) => run.measure(&run.settings(), &cases::tcp::all()),
+        Command::Supervision(run) => run.measure(&run.settings(), &cases::supervision::all()),
+        Command::Grid(run) => run.measure(&run.settings(), &cases::grid::all()),
+        Command::Plan(run) => run.measure(&run.settings(), &cases::plan::all()),
+        Command::Team(run) => run.measure(&run.settings(), &cases::team::all()),
         Command::Languages { run, python } => {
             let mut settings = Settings { python, ..run.settings() };
             settings.versions = c_version().into_iter().chain(Interpreter::of(&settings).versions()).collect();

@@ -1,21 +1,25 @@
 //! `rohrpost launch`: runs the modules of a node, with a live table.
 
 mod all;
+mod bundled;
 mod log_lines;
 
 use super::manager::Manager;
+use crate::begin::check;
 use crate::look::summary::{ModuleLine, module_lines, print_modules_live};
 use crate::running::call::level_of;
 use crate::terminal::speech::Speech;
 use crate::terminal::units::counted;
 use crate::terminal::{Failure, columns, folded, rows};
 pub(super) use all::{LaunchedNodes, lab};
+use bundled::{Bundled, launch_again};
 use log_lines::LogLines;
 use rohrpost::output::plain::Lines;
 use rohrpost_config::{Installation, Keys, Module, Replica};
 use rohrpost_launch::launcher::Phase;
 use rohrpost_launch::survey::Survey;
 use rohrpost_launch::{Launch, choose_node, events};
+use rohrpost_mailbox::sys;
 use rohrpost_routers::impair;
 use std::io::IsTerminal;
 use std::os::fd::OwnedFd;
@@ -54,6 +58,9 @@ pub(super) struct Arguments {
     /// table, or else on the standard error.
     #[arg(long, value_name = "LEVEL", num_args = 0..=1, require_equals = true, default_missing_value = "info")]
     log: Option<String>,
+    /// Launch from a bundle also where its files were changed since it was pushed, or its signature is not trusted.
+    #[arg(long)]
+    accept_changed_files: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -70,55 +77,93 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(code)
 }
 
-/// Reads an installation that can run here: mistakes that a router would find only at its start are reported at once. A
-/// node without a router needs no keys.
-fn load(arguments: &Arguments) -> Result<Arc<Installation>, Failure> {
-    let installation = crate::begin::check::load(&arguments.file)?;
-    let node = arguments.node.as_deref();
+/// Mistakes that a router would find only at its start are reported at once. A node without a router needs no keys.
+fn check_keys(installation: &Installation, node: Option<&str>) -> Result<(), Failure> {
     if node.is_none_or(|node| installation.router_of(node).is_some()) {
         installation.keys.as_deref().map(|folder| Keys::load(&Keys::file(folder))).transpose()?;
     }
-    Ok(Arc::new(installation))
+    Ok(())
 }
 
 /// Runs all nodes on this computer, until they have ended or a stop is requested.
 fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let installation = load(arguments)?;
+    let installation = Arc::new(check::load(&arguments.file)?);
+    check_keys(&installation, None)?;
     // Must run before the first thread; the speech has two.
     let lab = all::lab(&installation)?;
     let speech = Speech::begin()?;
     installation.security_texts().iter().for_each(|security| speech.say(security));
-    let mut nodes = LaunchedNodes::begin(installation, lab, arguments.impair, arguments.log.as_deref(), &speech)?;
+    let mut nodes = LaunchedNodes::begin([installation], lab, arguments.impair, arguments.log.as_deref(), &speech)?;
     while nodes.watch(Duration::MAX) {}
     let code = nodes.stop();
     speech.settle();
     Ok(code)
 }
 
+/// Launches a node. If that is from a bundle which does not stay up in its trial, launches the bundle before.
 fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
-    let installation = load(arguments)?;
-    let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
-    let least = arguments.log.as_deref().map(level_of).transpose()?;
-    let log = least.map(|least| LogLines::new(&installation, &node, least)).transpose()?;
+    let scheduling = sys::scheduling().ok();
+    let mut bundled = Bundled::begin(&arguments.file, speech)?;
+    let ended = launch_once(arguments, &mut bundled, speech);
+    if bundled.next().is_some()
+        && let Err(error) = &ended
+    {
+        speech.complain(&error.to_string());
+        speech.settle();
+    }
+    // Asked last: a word to stop that came meanwhile is the end.
+    let Some(next) = bundled.next() else { return ended };
+    Err(launch_again(&arguments.file, next, scheduling).into())
+}
+
+fn launch_once(arguments: &Arguments, bundled: &mut Bundled, speech: &Speech) -> Result<ExitCode, Failure> {
     let mut manager = Manager::from_environment(|warning| speech.complain(warning));
-    manager.starting(&node);
-    let resolved = crate::look::resolved::of_node(&installation, &node);
-    let sockets = router_sockets(installation.clone(), node.clone());
-    let mut launch =
-        Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, &resolved, sockets)?;
-    manager.ready(&launch);
-    let mut view = TerminalView { log, ..TerminalView::new(arguments.quiet, speech) };
-    view.began(&launch, &node);
-    let mut shown = Ok(());
-    while shown.is_ok() && launch.watch(view.wait().min(manager.wait())) {
+    let (mut launch, mut view) = begin(arguments, bundled, &mut manager, speech)?;
+    bundled.began(speech);
+    let (mut shown, mut is_over) = (Ok(()), false);
+    while !is_over && shown.is_ok() && launch.watch(view.wait().min(manager.wait()).min(bundled.wait())) {
         manager.alive(&launch);
         shown = view.show(&mut launch);
+        is_over = bundled.look(&launch, speech) && bundled.next().is_some();
     }
+    bundled.told_to_stop(speech);
     view.leave();
-    manager.stopping();
+    if is_over {
+        manager.going_back()
+    } else {
+        manager.stopping()
+    }
     // Also when the terminal is gone: the modules are stopped in order.
     let code = end(launch, speech);
     shown.map(|()| code)
+}
+
+/// Reads what is to be launched, and starts it.
+fn begin<'s>(
+    arguments: &Arguments,
+    bundled: &mut Bundled,
+    manager: &mut Manager,
+    speech: &'s Speech,
+) -> Result<(Launch, TerminalView<'s>), Failure> {
+    let least = arguments.log.as_deref().map(level_of).transpose()?;
+    let loaded = check::load(bundled.file(&arguments.file)).map_err(Failure::from);
+    let (mut installation, permit) = bundled.verify(loaded, arguments.accept_changed_files, speech)?;
+    installation.shown.clone_from(&arguments.file);
+    check_keys(&installation, arguments.node.as_deref())?;
+    let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
+    let installation = Arc::new(installation.seen_from(&node));
+    let log = least.map(|least| LogLines::new(&installation, &node, least)).transpose()?;
+    manager.starting(&node);
+    let resolved = crate::look::resolved::of_node(&installation, &node);
+    let sockets = router_sockets(installation.clone(), node.clone());
+    let executable = std::env::current_exe()?;
+    bundled.start()?;
+    let begun = Launch::begin_keeping(installation, &node, executable, events()?, &resolved, sockets, &permit);
+    let launch = begun.inspect_err(|error| bundled.did_not_start(error, speech))?;
+    manager.ready(&launch);
+    let view = TerminalView { log, ..TerminalView::new(arguments.quiet, speech) };
+    view.began(&launch, &node);
+    Ok((launch, view))
 }
 
 /// Stops everything; a module that failed for good or is in error sets the exit code.

@@ -1,5 +1,5 @@
 //! The `rohrpost` command. A folder for each kind of command, and in it one file or folder for each subcommand:
-//! `begin`, `running`, `measure`, `record` and `replay`, `nodes`, `computer`.
+//! `begin`, `running`, `measure`, `record` and `replay`, `nodes`, `team`, `computer`.
 //!
 //! Commands share `look`, which reads a node, near or far, and `terminal`: output, tables, units. `launch` opens the
 //! routers' sockets, `manager` talks to systemd. Golden files hold what `top` and `doctor` show.
@@ -24,16 +24,18 @@ mod record;
 mod replay;
 mod routers;
 mod running;
+mod team;
 mod terminal;
 
-use begin::{check, demo, interface, new};
+use begin::{arena, check, demo, interface, new};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use computer::{clean, completions, doctor, run, version};
+use computer::{clean, completions, doctor, man, run, version};
 use measure::{bw, delay, graph, hz, mailbox, ping, send, stream};
-use nodes::{keys, net, time};
-use running::{call, control, echo, list, log, param, status, top};
+use nodes::{bundle, keys, net, time};
+use running::{call, control, echo, halt, list, log, param, status, top};
 use std::process::ExitCode;
-use terminal::{complain, parser};
+use team::{entrances, members, path};
+use terminal::{complain, habits, parser};
 
 /// Prioritised mailboxes for robots: configure, launch, inspect, call.
 #[derive(Parser)]
@@ -52,12 +54,18 @@ enum Command {
     Launch(launch::Arguments),
     /// Run a simulated robot that drives and maps, or play a robot's log.
     Demo(demo::Arguments),
+    /// Move a simulated robot, and count what it touches.
+    Arena(arena::Arguments),
     /// End a module and start it again.
     Restart(control::Arguments),
     /// End a module; it stays ended until it is started.
     Stop(control::Arguments),
     /// Start a module that was stopped, has ended, or failed.
     Start(control::Arguments),
+    /// Stop a supervised robot; it stands until it is let go.
+    Halt(halt::HaltArguments),
+    /// Let a robot go on that was halted.
+    Resume(halt::ResumeArguments),
     /// List the modules and mailboxes of a running node.
     List(list::Arguments),
     /// Show one mailbox: its slots, losses and waits; disturbs nobody.
@@ -96,6 +104,12 @@ enum Command {
     Replay(replay::Arguments),
     /// Show how well each node knows the common time.
     Time(time::Arguments),
+    /// Show the robot's team: members, leader, views, clocks, intruders.
+    Team(members::Arguments),
+    /// Find the shortest path on a map, around robots.
+    Path(path::Arguments),
+    /// List the cells from which to block an intruder, nearest first.
+    Entrances(entrances::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
     /// Check whether this computer lets a robot run in time.
@@ -104,12 +118,16 @@ enum Command {
     Bench(bench::Arguments),
     /// Make, change and show keys and certificates of nodes.
     Keys(keys::Arguments),
+    /// Bring the files that nodes run to them, signed, and back.
+    Bundle(bundle::Arguments),
     /// Begin a module of your own: a project that builds and runs.
     New(new::Arguments),
     /// Write interfaces to files, and typed code of them.
     Interface(interface::Arguments),
     /// Print a script by which a shell completes what you type.
     Completions(completions::Arguments),
+    /// Write manual pages of all commands.
+    Man(man::Arguments),
     /// Print versions, of this program and of what nodes share.
     Version(version::Arguments),
     /// Run a built-in module by hand.
@@ -120,21 +138,30 @@ enum Command {
     TcpRouter(routers::Arguments),
     /// Carry packages between this node and the TCP router.
     TcpClient(routers::Arguments),
+    /// Carry packages to and from other systems without a server.
+    TeamRouter(routers::TeamArguments),
 }
 
 fn main() -> ExitCode {
     completions::answer(Arguments::command);
     let command = parser::grouped(Arguments::command());
     let words = parser::options_first(&command, std::env::args_os());
+    if let Some(ours) = habits::answer(&words) {
+        complain(ours);
+        return ExitCode::from(2);
+    }
     let matches = command.get_matches_from(words);
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match arguments.command {
         Command::Check(arguments) => check::run(&arguments),
         Command::Launch(arguments) => launch::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
+        Command::Arena(arguments) => arena::run(&arguments),
         Command::Restart(arguments) => control::run(&arguments, control::Order::Restart),
         Command::Stop(arguments) => control::run(&arguments, control::Order::Stop),
         Command::Start(arguments) => control::run(&arguments, control::Order::Start),
+        Command::Halt(arguments) => halt::halt(&arguments),
+        Command::Resume(arguments) => halt::resume(&arguments),
         Command::List(arguments) => list::run(&arguments),
         Command::Mailbox(arguments) => mailbox::run(&arguments),
         Command::Stream(arguments) => stream::run(&arguments),
@@ -154,18 +181,24 @@ fn main() -> ExitCode {
         Command::Record(arguments) => record::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Time(arguments) => time::run(&arguments),
+        Command::Team(arguments) => members::run(&arguments),
+        Command::Path(arguments) => path::run(&arguments),
+        Command::Entrances(arguments) => entrances::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Keys(arguments) => keys::run(&arguments),
+        Command::Bundle(arguments) => bundle::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Interface(arguments) => interface::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
+        Command::Man(arguments) => man::run(&arguments, parser::grouped(Arguments::command())),
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Router(arguments) => routers::connect(arguments),
         Command::TcpRouter(arguments) => routers::serve(arguments),
         Command::TcpClient(arguments) => routers::join(arguments),
+        Command::TeamRouter(arguments) => routers::team(arguments),
     };
     result.unwrap_or_else(|error| {
         complain(error);

@@ -51,7 +51,9 @@ impl Manager {
     /// All modules are on.
     pub(super) fn ready(&mut self, launch: &Launch) {
         self.status = status(launch);
-        self.say(format!("READY=1\nSTATUS={}", self.status));
+        // It is off after a way back, until here.
+        let watchdog = self.watchdog.map(|period| format!("\nWATCHDOG_USEC={}", period.as_micros()));
+        self.say(format!("READY=1\nSTATUS={}{}", self.status, watchdog.unwrap_or_default()));
     }
 
     /// Launch has completed a round of its loop. Sends the watchdog's message when it is due, and changes.
@@ -84,6 +86,11 @@ impl Manager {
     /// All modules are being stopped. The watchdog is off from here on: `TimeoutStopSec` bounds their time.
     pub(super) fn stopping(&mut self) {
         self.say("STOPPING=1\nSTATUS=stopping the modules, the last first\nWATCHDOG_USEC=0".into());
+    }
+
+    /// All modules are being stopped, and others are started next. The watchdog is off until they are on.
+    pub(super) fn going_back(&mut self) {
+        self.say("STATUS=stopping the modules, to go back to the bundle before\nWATCHDOG_USEC=0".into());
     }
 
     fn say(&mut self, words: String) {

@@ -1,5 +1,5 @@
-//! `rohrpost router`, `rohrpost tcp-router` and `rohrpost tcp-client`: carry packages between nodes, and beyond the
-//! LAN. Launch starts them as the configuration requires.
+//! `rohrpost router`, `rohrpost tcp-router`, `rohrpost tcp-client` and `rohrpost team-router`: carry packages between
+//! nodes, beyond the LAN, and between systems. Launch starts them as the configuration requires.
 
 use crate::terminal::Failure;
 use rohrpost::Start;
@@ -24,6 +24,23 @@ pub(super) struct Arguments {
 pub(super) fn serve(arguments: Arguments) -> Result<ExitCode, Failure> {
     let start = Start::from_arguments(arguments.arguments.into_iter());
     Ok(exit(start.and_then(rohrpost_router_daemon::run_tcp_router)))
+}
+
+/// Runs a router of the team.
+pub(super) fn team(arguments: TeamArguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter());
+    Ok(exit(start.and_then(rohrpost_router_daemon::run_team_router)))
+}
+
+#[derive(clap::Args)]
+#[command(after_help = "Example, on the first node of robot.toml: rohrpost team-router --config robot.toml --name \
+        team-router.0
+Launch starts it on each node that `address` of [team] names; start it by hand only if you start modules by hand.")]
+pub(super) struct TeamArguments {
+    /// The arguments of every module: --config FILE --name team-router.I [--off]; I is the place of its node in the
+    /// configuration, from 0.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
 }
 
 /// Runs a client.

@@ -1,15 +1,39 @@
 //! The part of an installation beyond the LAN: clients of the TCP router, and the names that are reached through it.
 
-use crate::classes::TCP;
+use crate::classes::{TCP, TEAM_ROUTER};
 use crate::installation::Installation;
 use crate::module::Module;
 use crate::tcp::{TCP_SERVER, Tcp};
+use crate::team::Team;
 use rohrpost_mailbox::{ALL_SYSTEMS, Name, local};
 
 impl Installation {
-    /// Security notes on LAN and TCP router, as far as there are any: `check` and every start print them.
+    /// Security notes on LAN, TCP router and team, as far as there are any: `check` and every start print them.
     pub fn security_texts(&self) -> Vec<String> {
-        self.security_text().into_iter().chain(self.tcp.as_ref().map(Tcp::security_text)).collect()
+        let beyond = self.tcp.as_ref().map(Tcp::security_text).into_iter();
+        let team = self.team.as_ref().map(Team::security_text);
+        self.security_text().into_iter().chain(beyond).chain(team).collect()
+    }
+
+    /// Whether a section of the file leads to other systems.
+    pub fn reaches_others(&self) -> bool {
+        self.tcp.is_some() || self.team.is_some()
+    }
+
+    /// The router of `[team]` on a node; none without that section, or where it names no address of the node.
+    pub fn team_router_of(&self, node: &str) -> Option<Name> {
+        let class = self.classes.id(TEAM_ROUTER)?;
+        self.team.as_ref()?.address_of(node)?;
+        self.node_index(node).map(|index| Name::new(self.system.id, class.0, index, local::COMMANDS))
+    }
+
+    /// The names of all other systems, and those in all systems at once: with `[team]` packages for these go to the
+    /// team's router.
+    pub fn names_of_others(&self) -> Vec<(Name, Name)> {
+        let own = self.system.id;
+        let below = (own > 1).then(|| (Name::new(1, 1, 0, 0), Name::new(own - 1, u8::MAX, u8::MAX, u8::MAX)));
+        let above = (Name::new(own + 1, 0, 0, 0), Name::new(ALL_SYSTEMS, u8::MAX, u8::MAX, u8::MAX));
+        below.into_iter().chain([above]).collect()
     }
 
     /// The client of the TCP router on a node; none without `[tcp]`.
@@ -43,10 +67,17 @@ impl Installation {
         ranges
     }
 
-    /// The names of a node that are registered at the TCP router: all that it hosts, except the mailboxes by which its
-    /// routers carry packages. The mailboxes that a router has in common with all modules are registered: others may
-    /// query it, and its lines of output arrive.
+    /// The names of a node that are registered at the TCP router: all that it [reaches](Self::names_reached), except
+    /// those that [move](Self::moving_names): the TCP router itself knows which node has these.
     pub fn names_registered(&self, node: &str) -> Vec<(Name, Name)> {
+        let moving = self.moving_names();
+        self.names_reached(node).into_iter().filter(|(first, _)| !moving.contains(&first.module())).collect()
+    }
+
+    /// The names of a node that are reached from beyond the LAN: all that it hosts, except the mailboxes by which its
+    /// routers carry packages. The mailboxes that a router has in common with all modules are reached: others may query
+    /// it, and its lines of output arrive.
+    pub fn names_reached(&self, node: &str) -> Vec<(Name, Name)> {
         let carries = |first: Name| {
             let module = self.modules_on(node).find(|module| module.names().any(|name| name == first));
             module.is_some_and(|module| !module.is_in_file())

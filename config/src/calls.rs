@@ -50,6 +50,8 @@ pub(crate) struct Calls {
     pub(crate) names: Vec<Name>,
     /// Line of each name.
     pub(crate) lines: Vec<usize>,
+    /// The names that nobody else may command, with their line.
+    pub(crate) alone: Vec<(Name, usize)>,
     /// The names with a reason.
     pub(crate) downwards: DownwardCalls,
     /// The names with a longest wait.
@@ -63,14 +65,15 @@ struct Entry<'d> {
     to: &'d str,
     downwards: Option<Downwards>,
     limit: Option<Duration>,
+    is_alone: bool,
 }
 
 impl Calls {
     pub(crate) fn read(list: &Item<'_>, directory: &Directory<'_>, what: &str) -> Self {
         let mut calls = Self::default();
         for item in list.list("[\"motor.0\"]").unwrap_or_default() {
-            let Some(Entry { to, downwards, limit }) = entry(&item, what) else { continue };
-            match directory.find(to) {
+            let Some(Entry { to, downwards, limit, is_alone }) = entry(&item, what) else { continue };
+            match directory.find(to).or_else(|unknown| directory.elsewhere(to).ok_or(unknown)) {
                 Ok(name) if calls.names.contains(&name) && name != Name::NONE => {
                     item.reader.report(item.line, format!("{what} names `{to}` twice in `calls`; drop one"));
                 }
@@ -81,6 +84,7 @@ impl Calls {
                         calls.may_wait(to, limit.unwrap_or(CALL_TIMEOUT));
                     }
                     calls.downwards.0.extend(downwards.map(|why| (name, why)));
+                    calls.alone.extend(is_alone.then_some((name, item.line)));
                     calls.limits.0.extend(limit.map(|limit| (name, limit)));
                 }
                 Err(unknown) => item.reader.report(
@@ -102,12 +106,17 @@ impl Calls {
 /// A name alone, or a table of a name and what is special about it.
 fn entry<'d>(item: &Item<'d>, what: &str) -> Option<Entry<'d>> {
     if !item.is_table() {
-        return Some(Entry { to: item.text_of_list("motor.0")?, downwards: None, limit: None });
+        return Some(Entry { to: item.text_of_list("motor.0")?, downwards: None, limit: None, is_alone: false });
     }
     let section = item.section(&format!("{what}, calls"))?;
     let to = section.required("to", "to = \"output.0\"").and_then(|item| item.text("output.0"));
     let subscribes = section.get("subscribes").and_then(|item| item.flag()) == Some(true);
     let within = section.get("within");
+    let alone = section.get("alone");
+    let is_alone = alone.as_ref().and_then(Item::flag) == Some(true);
+    if let Some(alone) = alone.filter(|_| is_alone && subscribes) {
+        alone.report("`alone` is of no use beside `subscribes = true`, which commands nothing; drop one of them");
+    }
     let example = "a picture may wait for it";
     let downwards = match &within {
         Some(within) if subscribes => {
@@ -116,15 +125,15 @@ fn entry<'d>(item: &Item<'d>, what: &str) -> Option<Entry<'d>> {
         }
         None if subscribes => Some(Downwards::Subscribes),
         // A reason that could not be read has its own message, and counts nevertheless.
-        Some(_) => section.get("although").map(|item| reason(&item, example)),
-        None => {
+        _ if within.is_some() || is_alone => section.get("although").map(|item| reason(&item, example)),
+        _ => {
             let although = section.required("although", &format!("although = \"{example}\""));
             Some(although.map_or(Downwards::Although(String::new()), |item| reason(&item, example)))
         }
     };
     let limit = within.and_then(|item| item.duration_above_zero("200 ms"));
     section.finish();
-    Some(Entry { to: to?, downwards, limit })
+    Some(Entry { to: to?, downwards, limit, is_alone })
 }
 
 fn reason(although: &Item<'_>, example: &str) -> Downwards {

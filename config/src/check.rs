@@ -8,6 +8,7 @@ use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::module::{Lines, Module};
 use crate::reader::Reader;
+use crate::standby;
 use crate::tdma::{self, TdmaLines};
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
@@ -35,6 +36,7 @@ pub(crate) fn across(installation: &Installation, lines: &[Lines], slots: Option
     }
     carried_twice(installation, reader);
     replica::validate(installation, reader);
+    standby::validate(installation, reader);
     // Consequences of other mistakes are not reported.
     if let Some(slots) = slots.filter(|_| reader.is_content()) {
         tdma::validate(installation, slots, reader);
@@ -45,16 +47,18 @@ pub(crate) fn across(installation: &Installation, lines: &[Lines], slots: Option
 fn importance(installation: &Installation, module: &Module, to: Name, line: usize, reader: &Reader<'_>) {
     let classes = &installation.classes;
     // The kernel and the mailboxes know the class of the process, not of an alias.
-    let Some(host) = installation.module(to) else { return };
-    let (own, other) = (module.name.class(), host.name.class());
+    let host = match installation.module(to) {
+        Some(host) => host.name,
+        // Classes are the same in all systems.
+        None if to.system() != installation.system.id => to,
+        None => return,
+    };
+    let (own, other) = (module.name.class(), host.class());
     let why = module.downwards.why(to);
     let (name, called) = (classes.format(module.name), classes.format(to));
     if other < own && why.is_none() {
-        let in_process = if host.name == to {
-            String::new()
-        } else {
-            format!(" (in the process of `{}`)", classes.format(host.name))
-        };
+        let in_process =
+            if host == to { String::new() } else { format!(" (in the process of `{}`)", classes.format(host)) };
         reader.report(
             line,
             format!(
@@ -163,6 +167,8 @@ fn claims(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
         // Modules beyond the LAN may call every module, and be called by each.
         let beyond = installation.tcp.is_some() && module.is_in_file();
         (callers.beyond, called.beyond) = (beyond, beyond);
+        let team = installation.team_router_of(&module.node).is_some() && module.is_in_file();
+        (callers.team, called.team) = (team, team);
         for ((key, spec), line) in module.mailboxes.each().into_iter().zip(lines.mailboxes) {
             let (senders, tools) = if key == "commands" { (&callers, TOOLS) } else { (&called, 0) };
             let claims = (senders.count() + tools) * usize::from(spec.claims);
@@ -194,21 +200,27 @@ struct Senders {
     router: bool,
     /// The client of the TCP router, for all beyond the LAN.
     beyond: bool,
+    /// The router of the team, for other systems.
+    team: bool,
 }
 
 impl Senders {
     fn of(installation: &Installation, module: &Module, sends: impl Fn(&Module) -> bool) -> Self {
         let senders = || installation.modules.iter().filter(|other| other.name != module.name && sends(other));
         Self {
-            local: senders().filter(|other| other.node == module.node).count(),
+            local: senders().filter(|other| other.nodes.iter().any(|node| module.nodes.contains(node))).count(),
             router: installation.router_of(&module.node).is_some()
-                && senders().any(|other| other.node != module.node && installation.lan_index(&other.node).is_some()),
+                && senders().any(|other| {
+                    let mut elsewhere = other.nodes.iter().filter(|node| module.nodes.iter().any(|own| own != *node));
+                    elsewhere.any(|node| installation.lan_index(node).is_some())
+                }),
             beyond: false,
+            team: false,
         }
     }
 
     fn count(&self) -> usize {
-        self.local + usize::from(self.router) + usize::from(self.beyond)
+        self.local + usize::from(self.router) + usize::from(self.beyond) + usize::from(self.team)
     }
 
     fn text(&self, tools: usize) -> String {
@@ -220,6 +232,7 @@ impl Senders {
         let router = self.router.then(|| String::from("the router"));
         let tools = (tools > 0).then(|| format!("{tools} tools"));
         let beyond = self.beyond.then(|| String::from("the client of the TCP router"));
-        modules.into_iter().chain(router).chain(beyond).chain(tools).collect::<Vec<_>>().join(" + ")
+        let team = self.team.then(|| String::from("the router of the team"));
+        modules.into_iter().chain(router).chain(beyond).chain(team).chain(tools).collect::<Vec<_>>().join(" + ")
     }
 }

@@ -11,6 +11,8 @@ pub const ROUTER: &str = "router";
 
 /// Class of the TCP router and of its clients, which are implicit with `[tcp]`.
 pub const TCP: &str = "tcp";
+/// Class of the routers of `[team]`, which are implicit with it; also the name of that built-in module.
+pub const TEAM_ROUTER: &str = "team-router";
 
 /// Class of the modules that draw.
 pub const GUI: &str = "gui";
@@ -98,6 +100,11 @@ impl ClassTable {
         };
         let Some(class) = self.id(class) else { return Err(self.no_class(text, class)) };
         Ok(Name::new(self.system, class.0, byte(text, "instance", instance)?, local::COMMANDS))
+    }
+
+    /// The system that names without one belong to.
+    pub(crate) fn system(&self) -> u8 {
+        self.system
     }
 
     /// Reads any mailbox name: `laser.0`, `laser.0.2`, `1.laser.0.2`, the class by name or number (`1.150.0.2`).

@@ -61,7 +61,10 @@ impl Installation {
         for module in &self.modules {
             let mut names: Vec<String> = module.names().skip(1).map(|name| name.to_string()).collect();
             names.sort();
-            lines.push(format!("module {} on {} aliases {}", module.name, module.node, names.join(" ")));
+            let witness = self.witness_of(module).filter(|_| module.has_standby());
+            let witness = witness.map_or(String::new(), |witness| format!(" witness {witness}"));
+            let nodes = module.nodes.join(" ");
+            lines.push(format!("module {} on {nodes} aliases {}{witness}", module.name, names.join(" ")));
         }
         // The order of the nodes is their index on the wire.
         if let Some(network) = &self.network {

@@ -1,8 +1,8 @@
 //! Which module owns which name: collected in a first pass, so that a module may refer to one further below.
 
-use crate::classes::{ClassTable, ROUTER, TCP, TOOL, class_of};
+use crate::classes::{ClassTable, ROUTER, TCP, TEAM_ROUTER, TOOL, class_of};
 use crate::reader::{Item, Section, nearest};
-use rohrpost_mailbox::Name;
+use rohrpost_mailbox::{ALL_SYSTEMS, Name, local};
 use std::collections::BTreeMap;
 
 /// The names of all modules and aliases of a file.
@@ -34,7 +34,7 @@ impl<'d> Directory<'d> {
     pub(crate) fn read(modules: &[Section<'d>], classes: &'d ClassTable, routers: &[Name]) -> Self {
         let owners = routers.iter().map(|name| (classes.format(*name), *name)).collect();
         let is_there = |class: &&str| routers.iter().any(|name| classes.name(name.class()) == Some(class));
-        let reserved = [ROUTER, TCP].into_iter().filter(is_there).collect();
+        let reserved = [ROUTER, TCP, TEAM_ROUTER].into_iter().filter(is_there).collect();
         let mut directory = Self { classes, owners, reserved };
         let mut lines: BTreeMap<&str, usize> = BTreeMap::new();
         for module in modules {
@@ -72,6 +72,7 @@ impl<'d> Directory<'d> {
         }
         let owner = match class_of(text) {
             ROUTER => "for the routers, which are there by themselves when there are several nodes",
+            TEAM_ROUTER => "for the routers of [team], which are there by themselves",
             _ => "for the TCP router and its clients, which are there by themselves with [tcp]",
         };
         if self.reserved.contains(&class_of(text)) {
@@ -88,6 +89,15 @@ impl<'d> Directory<'d> {
         let missing =
             |unknown: &Unknown| entry.report(format!("`{text}` is no [[module]]; {}", unknown.or("drop the entry")));
         self.find(text).inspect_err(missing).ok()
+    }
+
+    /// A module of another system: `2.laser.0.0`. Whether it runs, only that system knows; none if no section of this
+    /// file leads to other systems.
+    pub(crate) fn elsewhere(&self, text: &str) -> Option<Name> {
+        let is_reached = self.reserved.iter().any(|class| [TCP, TEAM_ROUTER].contains(class));
+        let name = self.classes.parse_name(text).ok().filter(|_| is_reached)?;
+        let is_other = ![self.classes.system(), ALL_SYSTEMS].contains(&name.system());
+        (is_other && name.local() == local::COMMANDS).then_some(name)
     }
 
     /// The module or alias that a text names.

@@ -22,8 +22,12 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// The problems of a file, in any order.
+    /// The problems of a file, in any order. A message that quotes the file shows its control characters as escapes, so
+    /// that it stays one line and commands no terminal.
     pub fn new(path: &Path, mut problems: Vec<Problem>) -> Self {
+        for problem in problems.iter_mut().filter(|problem| problem.message.contains(char::is_control)) {
+            problem.message = escaped(&problem.message);
+        }
         problems.sort_by_key(|problem| problem.line);
         problems.dedup();
         Self { path: path.to_owned(), problems }
@@ -38,6 +42,15 @@ impl Errors {
     pub fn problems(&self) -> &[Problem] {
         &self.problems
     }
+}
+
+/// Control characters as a TOML file writes them.
+fn escaped(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if c.is_control() { shown.extend(c.escape_default()) } else { shown.push(c) }
+    }
+    shown
 }
 
 impl fmt::Display for Errors {

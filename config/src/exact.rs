@@ -1,6 +1,6 @@
 //! Modules with a journal, so that they can be replayed exactly: `exact` of `[record]`.
 
-use crate::classes::{ClassTable, ROUTER};
+use crate::classes::{ClassTable, ROUTER, TEAM_ROUTER};
 use crate::directory::Directory;
 use crate::module::{Module, Program, RECORDER, REPLAY, TCP_CLIENT, TCP_ROUTER};
 use crate::reader::Section;
@@ -9,7 +9,7 @@ use rohrpost_mailbox::Name;
 use std::time::Duration;
 
 /// Built-in modules that take in what no journal sees: descriptors, files, threads, packages past their proxies.
-const WITHOUT: [&str; 7] = [RECORDER, REPLAY, ROUTER, TCP_CLIENT, TCP_ROUTER, "output", "carmen"];
+const WITHOUT: [&str; 8] = [RECORDER, REPLAY, ROUTER, TEAM_ROUTER, TCP_CLIENT, TCP_ROUTER, "output", "carmen"];
 
 /// The stream that a journal is written into: with little to do it holds the last 20 s. Journals are in order by
 /// themselves, so no record is late.

@@ -5,8 +5,10 @@ mod memory;
 mod record;
 mod slots;
 mod timeline;
+mod ways;
 
 use crate::calls::Downwards;
+use crate::classes::TEAM_ROUTER;
 use crate::installation::Installation;
 use crate::mailbox::TRANSIT;
 use crate::module::{BUSY_AFTER, Module, Program, Start, TCP_CLIENT, TCP_ROUTER};
@@ -122,6 +124,7 @@ impl Page<'_> {
         }
         self.network();
         self.tcp();
+        self.team();
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
     }
 
@@ -135,58 +138,6 @@ impl Page<'_> {
             names => format!("if it is silent, that of {}", names.join(", then ")),
         };
         format!("the clock of node {first}, the master; {next}; told every {}", duration_text(interval))
-    }
-
-    fn network(&mut self) {
-        let Some(network) = self.installation.network else { return };
-        let sends = match &self.installation.tdma {
-            None => format!("at most {} a second", size_text(network.rate_bytes_s)),
-            Some(_) => "in its time slots only".into(),
-        };
-        let (port, time_port) = (network.port, network.time_port());
-        let ports = match (self.installation.rest_port(), self.installation.replica_port()) {
-            (Some(rest), Some(replicas)) => format!(
-                "{port} (packages), {time_port} (time), {rest} (packages that are not real time) and {replicas} \
-                 (replicas)"
-            ),
-            (Some(rest), None) => {
-                format!("{port} (packages), {time_port} (time) and {rest} (packages that are not real time)")
-            }
-            (None, Some(replicas)) => format!("{port} (packages), {time_port} (time) and {replicas} (replicas)"),
-            (None, None) => format!("{port} (packages) and {time_port} (time)"),
-        };
-        self.entry(
-            "network",
-            &format!(
-                "UDP ports {ports}; IP packets of at most {} B, so datagrams of {} B; each router sends {}, and keeps \
-                 {} of each sender waiting",
-                network.mtu,
-                network.datagram_bytes_max,
-                sends,
-                size_text(network.quota_bytes as u64)
-            ),
-        );
-        if let Some(security) = self.installation.security_text() {
-            self.entry("security", &security);
-        }
-    }
-
-    fn tcp(&mut self) {
-        let Some(tcp) = &self.installation.tcp else { return };
-        let runs = match &tcp.server {
-            Some(node) => {
-                format!("it runs on node {node}, takes {}", count_text(tcp.clients.into(), "client"))
-            }
-            None => "another installation runs it".into(),
-        };
-        let words = format!(
-            "TCP router at {}: what neither a node nor its LAN has goes there; {runs}; {} wait for a connection at \
-             most",
-            tcp.address,
-            size_text(tcp.quota_bytes as u64)
-        );
-        self.entry("beyond", &words);
-        self.entry("security", &tcp.security_text());
     }
 
     fn classes(&mut self) {
@@ -235,6 +186,10 @@ impl Page<'_> {
         let (hand, launch) = (node.tools_by_hand(), node.launch_instance());
         let (first, last) = (hand.start(), hand.end());
         self.entry("tools", &format!("launch is tool.{launch}; programs run by hand are tool.{first} to tool.{last}"));
+        let standby = self.installation.stands_by(&node.name);
+        if !standby.is_empty() {
+            self.entry("stands by", &format!("for {}", self.names(standby)));
+        }
         for module in modules {
             self.module(module);
         }
@@ -249,6 +204,7 @@ impl Page<'_> {
             self.entry("is also", &self.names(module.aliases.iter().copied()));
         }
         self.entry("runs", &runs(module));
+        self.installation.standby_text(module).iter().for_each(|words| self.entry("nodes", words));
         self.entry("starts", &starts(module));
         self.entry("when it ends", &module.restart.to_string());
         let subscribes = |name: &Name| module.downwards.subscribes(*name);
@@ -265,6 +221,7 @@ impl Page<'_> {
                 self.entry("waits", &format!("for {} at most {}", self.name(*to), duration_text(limit)));
             }
         }
+        self.elsewhere(module);
         let callers =
             self.installation.modules.iter().filter(|other| module.names().any(|own| other.calls.contains(&own)));
         self.entry("called by", &self.names(callers.map(|caller| caller.name)));
@@ -359,6 +316,7 @@ fn runs(module: &Module) -> String {
             let what = match name.as_str() {
                 TCP_CLIENT => "this node's client of the TCP router",
                 TCP_ROUTER => "the TCP router",
+                TEAM_ROUTER => "this node's router of [team]",
                 _ => "the router of this node",
             };
             return format!("{what}, there by itself");

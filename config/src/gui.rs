@@ -47,7 +47,10 @@ impl Show {
     fn read(item: &Item<'_>, directory: &Directory<'_>) -> Option<Self> {
         let section = item.section("[gui] show")?;
         let from = section.required("from", "from = \"laser.0\"");
-        let from = from.and_then(|item| directory.module(&item, item.text("laser.0")?));
+        let from = from.and_then(|item| {
+            let text = item.text("laser.0")?;
+            directory.elsewhere(text).or_else(|| directory.module(&item, text))
+        });
         let data = section.get("data").and_then(|item| item.text("scan"));
         let rate = section.get("rate").and_then(|item| item.number(0.0..=1000.0, "10.0"));
         section.finish();

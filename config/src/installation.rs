@@ -13,6 +13,7 @@ use crate::replica::Replica;
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tcp::Tcp;
+use crate::team::Team;
 use crate::time::{ClockSetPolicy, TimeSource};
 use rohrpost_mailbox::{Class, Name, saturating_sum};
 use rohrpost_network::{Network, Tdma};
@@ -37,8 +38,8 @@ pub struct Installation {
     pub classes: ClassTable,
     /// The nodes, at least one: in the order of the file, but nodes that are not on the LAN come last.
     pub nodes: Vec<Node>,
-    /// The modules, in the order of their start: the routers, if there are several nodes, the modules of `[tcp]`, then
-    /// those of the file.
+    /// The modules, in the order of their start: the routers, if there are several nodes, the modules of `[tcp]` and
+    /// `[team]`, then those of the file.
     pub modules: Vec<Module>,
     /// How nodes reach each other; none if there is one only.
     pub network: Option<Network>,
@@ -48,6 +49,8 @@ pub struct Installation {
     pub tdma: Option<Tdma>,
     /// The TCP router beyond the LAN; none if nothing goes there.
     pub tcp: Option<Tcp>,
+    /// The way to other systems without a server; none if there is none.
+    pub team: Option<Team>,
     /// Where system time comes from.
     pub time: TimeSource,
     /// What happens when the computer's clock was set since system time began.

@@ -42,7 +42,7 @@ impl Installation {
     }
 
     /// All names that lie on other nodes of the LAN than this one: their modules, aliases and tools, each with all its
-    /// mailboxes. Sorted by name; no two overlap.
+    /// mailboxes, except [those that move](Self::moving_names). Sorted by name; no two overlap.
     pub fn routes_from(&self, node: &str) -> Vec<Route> {
         let mut routes = Vec::new();
         for (other, index) in self.lan_nodes().iter().zip(0..).filter(|(other, _)| other.name != node) {
@@ -53,7 +53,9 @@ impl Installation {
             };
             let tool = |instance: u8| Name::new(self.system.id, self.classes.tool().0, instance, 0);
             routes.push(whole(tool(*other.tools.start()), tool(*other.tools.end())));
-            routes.extend(self.modules_on(&other.name).flat_map(Module::names).map(|name| whole(name, name)));
+            let stays = |module: &&Module| !module.has_standby();
+            let names = self.modules_on(&other.name).filter(stays).flat_map(Module::names);
+            routes.extend(names.map(|name| whole(name, name)));
         }
         routes.sort_by_key(|route| route.first);
         routes

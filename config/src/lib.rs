@@ -32,10 +32,11 @@
 //! Each section has a file that reads and checks it and words its mistakes (`module`, `classes`, `flow`, `tdma` …);
 //! `errors` prints them, `reader` words wrong types and unknown keys. `config/tests/broken` has an example of each.
 //!
-//! Every key of the file is described in [`manual`].
+//! Every key of the file is described in `docs/src/configuration.md`.
 #![forbid(unsafe_code)]
 
 mod access;
+mod alone;
 mod beyond;
 mod calls;
 mod check;
@@ -45,6 +46,7 @@ mod digest;
 mod directory;
 mod errors;
 mod exact;
+pub mod examples;
 mod explain;
 mod flow;
 mod gui;
@@ -56,6 +58,7 @@ mod load;
 mod log_control;
 mod mailbox;
 mod module;
+mod module_nodes;
 mod network;
 mod node;
 mod output;
@@ -70,17 +73,19 @@ mod restart;
 mod saved;
 mod scheduling;
 mod settings;
+mod standby;
 mod stopping;
 mod stream;
 mod tcp;
 mod tdma;
+mod team;
 mod time;
 mod units;
 mod watchdog;
 
 pub use access::{Access, AccessRule, ClassSet, Commanded};
 pub use calls::{CALL_TIMEOUT, CallLimits, DownwardCalls, Downwards};
-pub use classes::{ClassEntry, ClassTable, GUI, NameTextError, ROUTER, TCP, TOOL};
+pub use classes::{ClassEntry, ClassTable, GUI, NameTextError, ROUTER, TCP, TEAM_ROUTER, TOOL};
 pub use contents::{Contents, ContentsError};
 pub use digest::Digest;
 pub use errors::{Errors, Problem, SettingsError};
@@ -92,6 +97,7 @@ pub use installation::Installation;
 pub use keys::{KEY_BYTES, Key, Keys, KeysError, open_secret};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX, TRANSIT};
 pub use module::{BUILTINS, Module, Program, RECORDER, REPLAY, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER};
+pub use module_nodes::{NODES_OF_MODULE_MAX, Standby};
 pub use node::{Node, Reach, System};
 pub use output::{Level, LineFormat, Output};
 pub use plan::{bounds, records_left};
@@ -105,13 +111,17 @@ pub use rohrpost_mailbox::OverflowPolicy;
 pub use saved::{Saved, SavedDocument, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::Document;
+pub use standby::{HOLDERS_FILE, LeaseTimes, MOVING_MODULES_MAX, holder_line, holders};
 pub use stream::{RECORD_BYTES_MAX, StreamSpec};
 pub use tcp::{TCP_SERVER, Tcp};
+pub use team::{TEAM_PEERS_MAX, Team, TeamPeer, TeamReach, hosts};
 pub use time::{ClockSetPolicy, TimeSource};
 pub use units::{
     UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,
 };
 pub use watchdog::Watchdog;
 
+/// Examples of the book, which lies outside the package: only tests of documentation have it.
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/src/configuration.md")]
 pub mod manual {}

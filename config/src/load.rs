@@ -19,13 +19,14 @@ use crate::saved::Saved;
 use crate::scheduling::SchedulingRule;
 use crate::tcp::{self, Tcp};
 use crate::tdma;
+use crate::team::{self, Team};
 use crate::time::TimeSource;
 use rohrpost_mailbox::Name;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
 impl Installation {
-    /// Reads and checks a file, and the parameters saved beside it.
+    /// Reads and checks a file, the parameters saved beside it, and the hosts of its team.
     pub fn load(path: &Path) -> Result<Self, Errors> {
         let text = std::fs::read_to_string(path).map_err(|error| {
             let message = format!("cannot be read ({error}); name an installation's file, such as config/demo.toml");
@@ -35,11 +36,14 @@ impl Installation {
         if let Some(file) = &installation.parameters {
             installation.saved = Some(Saved::load(file, &installation)?);
         }
+        if let Some(team) = &mut installation.team {
+            team.read_hosts(installation.system.id)?;
+        }
         Ok(installation)
     }
 
     /// Checks the text of a file; `path` is its name in messages and the place that relative paths start from. Saved
-    /// parameters are not read.
+    /// parameters and files of hosts are not read.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Errors> {
         let reader = Reader::new(text);
         let (document, syntax) = DeTable::parse_recoverable(text);
@@ -84,6 +88,10 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         tcp::validate(&file, &classes, scheduling);
     }
     tcp::validate_nodes(&file, tcp.as_ref(), &nodes);
+    let team = file.section("team", "[team]").map(|section| Team::read(section, system.id, &nodes, &folder));
+    if team.is_some() {
+        team::validate(&file, &classes, scheduling);
+    }
 
     let sections = self::sections(&file, "module");
     if sections.is_empty() {
@@ -91,6 +99,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     }
     let mut routers = network::routers(on_lan, &classes, system.id);
     routers.extend(tcp::modules(tcp.as_ref(), &nodes, &classes, system.id));
+    routers.extend(team::modules(team.as_ref(), &nodes, &classes, system.id));
     let router_names: Vec<Name> = routers.iter().map(|(router, _)| router.name).collect();
     let directory = Directory::read(&sections, &classes, &router_names);
     let context = Context { directory: &directory, nodes: &nodes };
@@ -106,6 +115,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let replicas: Vec<Replica> = replicas.collect();
     let has_replica = |items: &_, node: &_| replicas.iter().any(|replica| replica.is_of(items, node));
     record::connect((record.as_ref(), &has_replica), &file, &classes, &mut modules, &mut lines);
+    let access = access.with_alone(&modules, &lines, &gui, &classes, reader);
     let flow_sections = self::sections(&file, "flow").into_iter();
     let flows = flow_sections.filter_map(|section| Flow::read(section, &directory)).collect();
     file.finish();
@@ -126,6 +136,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         keys,
         tdma,
         tcp,
+        team,
         time,
         when_set,
         access,

@@ -1,8 +1,10 @@
 //! Modules: what runs where, with which settings, and what happens when it ends.
 
 use crate::calls::{CallLimits, Calls, DownwardCalls};
+use crate::classes::TEAM_ROUTER;
 use crate::directory::Directory;
 use crate::mailbox::{MailboxLines, Mailboxes, TRANSIT, lines_at};
+use crate::module_nodes::{self, Standby};
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
 use crate::restart::Restart;
@@ -23,7 +25,8 @@ pub const RECORDER: &str = "logd";
 /// The built-in module that plays recordings.
 pub const REPLAY: &str = "replay";
 /// The modules that the `rohrpost` program itself contains.
-pub const BUILTINS: [&str; 8] = ["sim", "carmen", "mapper", "pilot", "wormhole", "output", RECORDER, REPLAY];
+pub const BUILTINS: [&str; 10] =
+    ["sim", "carmen", "mapper", "pilot", "mischief", "wormhole", "team", "output", RECORDER, REPLAY];
 
 /// What runs as a module.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,8 +63,15 @@ pub struct Module {
     pub name: Name,
     /// Further names that its process hosts.
     pub aliases: Vec<Name>,
-    /// Node that it runs on.
+    /// Node that it runs on; of several, the first choice, or the one that the installation is
+    /// [seen from](crate::Installation::seen_from).
     pub node: String,
+    /// Nodes that may run it, first choice first; mostly one.
+    pub nodes: Vec<String>,
+    /// Node that grants its lease, if the file says it.
+    pub(crate) witness: Option<String>,
+    /// How its other nodes stand by.
+    pub standby: Standby,
     /// What runs.
     pub program: Program,
     /// Whether it is left out with a notice when its program does not exist.
@@ -107,7 +117,7 @@ impl Module {
     }
 
     /// Whether it is a `[[module]]` of the file. Routers are implicit when there are several nodes, and so are the
-    /// modules of `[tcp]`.
+    /// modules of `[tcp]` and `[team]`.
     pub fn is_in_file(&self) -> bool {
         self.index.is_some()
     }
@@ -122,10 +132,13 @@ impl Module {
             name,
             aliases: Vec::new(),
             node: node.name.clone(),
+            nodes: vec![node.name.clone()],
+            witness: None,
+            standby: Standby::default(),
             program: Program::Builtin(builtin.into()),
             optional: false,
             // A robot starts even if its certificates or its link beyond the LAN are missing.
-            required: ![TCP_CLIENT, TCP_ROUTER].contains(&builtin),
+            required: ![TCP_CLIENT, TCP_ROUTER, TEAM_ROUTER].contains(&builtin),
             calls: Vec::new(),
             downwards: DownwardCalls::default(),
             call_limits: CallLimits::default(),
@@ -142,7 +155,7 @@ impl Module {
             line: node.line,
             index: None,
         };
-        (module, Lines { mailboxes: lines_at(node.line), calls: Vec::new() })
+        (module, Lines { mailboxes: lines_at(node.line), calls: Vec::new(), alone: Vec::new() })
     }
 
     /// Whether it has a mailbox for packages that go elsewhere.
@@ -173,6 +186,8 @@ pub(crate) struct Lines {
     pub(crate) mailboxes: MailboxLines,
     /// Line of each name in [`Module::calls`].
     pub(crate) calls: Vec<usize>,
+    /// The names that it calls alone, with their line.
+    pub(crate) alone: Vec<(Name, usize)>,
 }
 
 /// Context for the names that a module refers to.
@@ -189,7 +204,12 @@ impl Context<'_> {
         let section = section.called(&what);
         let name = name_text.and_then(|text| self.directory.find(text).ok());
         let aliases = section.get("aliases").map(|item| self.aliases(&item)).unwrap_or_default();
-        let node = self.node(&section);
+        let nodes = module_nodes::read(&section, &|item, name| self.is_known(item, name));
+        let node = if nodes.is_empty() { self.node(&section) } else { nodes.first().cloned() };
+        let witness = section.get("witness").and_then(|item| Some((item.text("base")?, item)));
+        let witness = witness.filter(|(name, item)| self.is_known(item, name)).map(|(name, _)| name.into());
+        let standby = &[("hot", Standby::Hot), ("cold", Standby::Cold)];
+        let standby = section.or("standby", Standby::default(), |item| item.choice(standby));
         let program = program(&section);
         let optional = section.or("optional", false, Item::flag);
         let required = required(&section, optional);
@@ -212,7 +232,10 @@ impl Context<'_> {
         let module = Module {
             name: name?,
             aliases,
+            nodes: if nodes.is_empty() { node.iter().cloned().collect() } else { nodes },
             node: node?,
+            witness,
+            standby,
             stop_within: stop_within.unwrap_or(crate::stopping::usual(is_recorder)),
             program,
             optional,
@@ -232,7 +255,7 @@ impl Context<'_> {
             line,
             index: Some(index),
         };
-        Some((module, Lines { mailboxes: mailbox_lines, calls: calls.lines }))
+        Some((module, Lines { mailboxes: mailbox_lines, calls: calls.lines, alone: calls.alone }))
     }
 
     /// The directory has read and validated the texts already.
@@ -255,16 +278,22 @@ impl Context<'_> {
                 }
             };
         };
-        let name = item.text("main")?;
-        if !names().any(|known| known == name) {
-            let right = match nearest(name, names()) {
-                Some(known) => format!("did you mean `{known}`? Otherwise add `[nodes.{name}]`"),
-                None => format!("the nodes are {}; or add `[nodes.{name}]`", names().collect::<Vec<_>>().join(", ")),
-            };
-            item.report(format!("there is no node `{name}`; {right}"));
-            return None;
-        }
+        let name = item.text("main").filter(|name| self.is_known(&item, name))?;
         Some(name.into())
+    }
+
+    /// Whether there is this node; if not, that is reported.
+    fn is_known(&self, item: &Item<'_>, name: &str) -> bool {
+        let names = || self.nodes.iter().map(|node| node.name.as_str());
+        if names().any(|known| known == name) {
+            return true;
+        }
+        let right = match nearest(name, names()) {
+            Some(known) => format!("did you mean `{known}`? Otherwise add `[nodes.{name}]`"),
+            None => format!("the nodes are {}; or add `[nodes.{name}]`", names().collect::<Vec<_>>().join(", ")),
+        };
+        item.report(format!("there is no node `{name}`; {right}"));
+        false
     }
 }
 

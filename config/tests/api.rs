@@ -286,3 +286,25 @@ fn ten_times_as_many_lines_that_are_no_toml_take_about_ten_times_as_long() {
     });
     assert!(times[1] < 3 * times[0], "{times:?} ns");
 }
+
+#[test]
+fn two_that_each_command_a_name_of_one_process_alone_do_not_command_the_other_s() {
+    let installation = parse(
+        "installation = \"alone\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nmotor = { id = 220 }\n\
+         left = { id = 210 }\nright = { id = 209 }\nlaser = { id = 150 }\ntool = { id = 16 }\n[nodes.main]\n\
+         [[module]]\nname = \"motor.1\"\naliases = [\"motor.2\", \"laser.0\"]\nprogram = \"wheels\"\n\
+         [[module]]\nname = \"left.0\"\nprogram = \"left\"\ncalls = [{ to = \"motor.1\", alone = true }]\n\
+         [[module]]\nname = \"right.0\"\nprogram = \"right\"\ncalls = [{ to = \"motor.2\", alone = true }]\n",
+    );
+    let name = |text: &str| installation.classes.parse_module(text).unwrap();
+    for (from, to, may) in [
+        ("left.0", "motor.1", true),
+        ("left.0", "motor.2", false),
+        ("right.0", "motor.1", false),
+        ("right.0", "motor.2", true),
+        ("left.0", "laser.0", true),
+        ("right.0", "laser.0", true),
+    ] {
+        assert_eq!(installation.access_against(name(from), name(to)).is_none(), may, "{from} to {to}");
+    }
+}

@@ -49,11 +49,13 @@ fn files_that_ship_load_and_explain_themselves() {
         "demo-tcp.toml",
         "tests/tdma.toml",
         "tests/tcp.toml",
+        "tests/team.toml",
         "tests/beyond.toml",
         "tests/record.toml",
         "tests/replica.toml",
         "tests/replica-slots.toml",
         "tests/full.toml",
+        "tests/standby.toml",
     ] {
         let text = fs::read_to_string(folder().join(file)).unwrap();
         let installation = Installation::parse(&text, Path::new(file)).unwrap_or_else(|errors| panic!("{errors}"));
@@ -91,6 +93,8 @@ fn manual_names_every_key_and_its_example_loads() {
     let manual = fs::read_to_string(folder().join("../docs/src/configuration.md")).unwrap();
     let read = |file: &str| fs::read_to_string(folder().join("tests").join(file)).unwrap();
     let (full, tcp, record) = (read("full.toml"), read("tcp.toml"), read("record.toml"));
+    let team = read("team.toml");
+    let team = team.split_once("[team]").unwrap().1.split_once("[gui]").unwrap().0;
     let replica = read("replica.toml");
     let replicated = replica.split_once("\n[[replica]]\n").unwrap().1;
     let modules = full.split_once("[[module]]").unwrap().1;
@@ -99,6 +103,7 @@ fn manual_names_every_key_and_its_example_loads() {
     let keys = modules
         .lines()
         .chain(beyond.lines())
+        .chain(team.lines())
         .chain(recorded.lines())
         .chain(replicated.lines())
         .filter(|line| !line.starts_with("settings"))

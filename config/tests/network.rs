@@ -203,3 +203,19 @@ fn sixty_four_replicas_are_taken_and_one_more_is_not() {
     let errors = with(65).expect_err("65 are too many").to_string();
     assert!(errors.contains("there are more than 64; drop some") && errors.trim().lines().count() == 1, "{errors}");
 }
+
+#[test]
+fn sixteen_modules_have_several_nodes_and_one_more_has_not() {
+    let with = |count: usize| {
+        let module =
+            |at: usize| format!("[[module]]\nname = \"mapper.{at}\"\nprogram = \"m\"\nnodes = [\"desk\", \"base\"]\n");
+        let text = include_str!("standby.toml").to_owned() + &(1..count - 1).map(module).collect::<String>();
+        Installation::parse(&text, Path::new("standby.toml")).map(|all| all.modules_with_standby().count())
+    };
+    assert_eq!(with(16).unwrap_or_else(|errors| panic!("{errors}")), 16);
+    let errors = with(17).expect_err("17 are too many").to_string();
+    assert!(
+        errors.contains("more than 16 modules with several nodes") && errors.trim().lines().count() == 1,
+        "{errors}"
+    );
+}

@@ -96,6 +96,18 @@ fn the_mailboxes_by_which_routers_carry_packages_are_never_registered() {
 }
 
 #[test]
+fn a_name_that_moves_is_reached_at_each_of_its_nodes_and_registered_at_none() {
+    let text =
+        include_str!("beyond.toml").replace("node = \"brain\"\nbuiltin", "nodes = [\"brain\", \"base\"]\nbuiltin");
+    let pilot = parse(&text).classes.parse_module("pilot.0").unwrap();
+    for node in ["brain", "base"] {
+        let field = parse(&text).seen_from(node);
+        let has = |ranges: Vec<(Name, Name)>| ranges.iter().any(|(first, last)| (*first..=*last).contains(&pilot));
+        assert_eq!((has(field.names_reached(node)), has(field.names_registered(node))), (true, false), "{node}");
+    }
+}
+
+#[test]
 fn without_the_section_nothing_is_beyond() {
     let demo = parse(include_str!("../demo.toml"));
     assert_eq!((demo.tcp.clone(), demo.tcp_client_of("main"), demo.tcp_router()), (None, None, None));

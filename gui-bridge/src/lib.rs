@@ -46,6 +46,7 @@ mod store;
 mod subjects;
 mod supervisor;
 mod tcp_links;
+mod team;
 mod timelines;
 mod trajectory;
 mod view;

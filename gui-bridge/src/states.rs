@@ -8,13 +8,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The states of a module, and their colours as 0xRRGGBBAA.
-const COLOURS: [(Standing, u32); 9] = [
+const COLOURS: [(Standing, u32); 10] = [
     (Standing::Starting, 0x5B8D_EFFF),
     (Standing::On, 0x3FA7_60FF),
     (Standing::Off, 0x6B74_80FF),
     (Standing::Error, 0xE6A0_1FFF),
     (Standing::Busy, 0xF2C1_4EFF),
     (Standing::Stopped, 0x8A8F_98FF),
+    (Standing::StandsBy, 0x7C93_A8FF),
     (Standing::Failed, 0xD643_4EFF),
     (Standing::Restarting { attempt: 0, most: 0 }, 0xE57F_84FF),
     (Standing::Unreachable, 0xA97B_D6FF),
@@ -96,7 +97,7 @@ impl Scene {
         let level = match state {
             Standing::Failed => Level::Error,
             Standing::Error | Standing::Busy | Standing::Restarting { .. } | Standing::Unreachable => Level::Warning,
-            Standing::Starting | Standing::On | Standing::Off | Standing::Stopped => Level::Info,
+            Standing::Starting | Standing::On | Standing::Off | Standing::Stopped | Standing::StandsBy => Level::Info,
         };
         self.output_line(module, level, text);
     }

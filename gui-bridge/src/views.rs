@@ -11,6 +11,7 @@ use crate::scene::Scene;
 use crate::slots::{Flows, Slots};
 use crate::states::Level;
 use crate::tcp_links::TcpLinks;
+use crate::team::Teams;
 use crate::view::{Datum, View, Wish, is};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CartographerInterface;
@@ -27,6 +28,7 @@ pub(crate) fn built_in() -> Vec<Box<dyn View>> {
         Box::new(Localisation),
         Box::new(Pictures),
         Box::new(Clouds),
+        Box::new(Teams),
         Box::new(Output),
         // Before the network: of both tabs the first is there.
         Box::new(Replicas::default()),

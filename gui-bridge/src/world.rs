@@ -9,6 +9,7 @@
 //!   trajectory/MODULE/CHUNK   see `trajectory`
 //!   scan/MODULE          the last sweep, in the world's frame
 //!   robot/MODULE         where this module believes the robot to be
+//!   team/MODULE          see `team`
 //! ```
 
 use crate::error::{DrawError, TILES_MAX};
@@ -155,7 +156,7 @@ impl Scene {
     }
 
     /// Draws the frame anew if the world has grown.
-    fn frame(&mut self) {
+    pub(crate) fn frame(&mut self) {
         let Some(frame) = self.world.extent.grown() else { return };
         let (bar, metres) = frame.scale();
         // A view makes room for what is drawn, seen or not: the outline in the ground's colour is a margin.

@@ -48,6 +48,8 @@ pub struct Sender {
     participant: Arc<Participant>,
     /// Mailbox that the packages are for.
     to: Name,
+    /// Mailbox that was opened: also when it is looked for again, whatever name the packages are for by then.
+    opened: Name,
     /// Its memory, or that of the router's mailbox.
     segment: Segment,
     /// The registry's epoch in which the mailbox was found, or found to be elsewhere.
@@ -91,7 +93,7 @@ impl Participant {
         let place = Place::of(self.claimant());
         let posts = Posts::new(&segment.shape);
         let flows = self.traffic().writer();
-        Ok(Sender { participant: self.clone(), to: name, segment, epoch, reach, place, posts, flows })
+        Ok(Sender { participant: self.clone(), to: name, opened: name, segment, epoch, reach, place, posts, flows })
     }
 }
 
@@ -138,8 +140,8 @@ impl Sender {
         self.to
     }
 
-    /// From now on packages are for another name, by the same way: for a caller that sends by a router to names that
-    /// others choose, and must not search for each of them. Whether a router leads there is the caller's to know.
+    /// From now on packages are for another name, by the same way, whatever else leads there: for a caller that sends
+    /// by a router to names that others choose. Whether that router leads there is the caller's to know.
     pub fn readdress(&mut self, to: Name) {
         self.to = to;
     }
@@ -220,8 +222,7 @@ impl Sender {
             if let Some(refused) = self.refusal(&why, priority, len) {
                 return Err(refused);
             }
-            let successor = open(&self.participant, self.to, self.reach)?;
-            self.enter(successor)?;
+            self.enter(open(&self.participant, self.opened, self.reach)?)?;
             match self.claim_here(priority, label, len) {
                 Ok(claim) => return Ok(claim),
                 Err(next) => why = next,
@@ -244,7 +245,7 @@ impl Sender {
 
     /// Whether a router takes the packages further.
     fn is_routed(&self) -> bool {
-        self.segment.name != self.to
+        self.segment.name != self.opened
     }
 
     /// Looks whether the mailbox is on this node by now, or another router leads to it: what is here goes before any
@@ -253,8 +254,8 @@ impl Sender {
     fn look_again(&mut self) -> Result<(), SendError> {
         let epoch = self.participant.node().registry_epoch();
         let node = self.participant.node().directory();
-        let router = || routes::find(node, self.to).ok().flatten().filter(|router| *router != self.segment.name);
-        let better = match open_here(&self.participant, self.to)? {
+        let router = || routes::find(node, self.opened).ok().flatten().filter(|router| *router != self.segment.name);
+        let better = match open_here(&self.participant, self.opened)? {
             None => router().map(|router| open_here(&self.participant, router)).transpose()?.flatten(),
             here => here,
         };
@@ -330,7 +331,7 @@ impl Sender {
 
     /// Copies a claim of a retired mailbox into one of its successor.
     fn move_on(&mut self, mut old: Claim, priority: Priority, len: usize) -> Result<Claim, SendError> {
-        let successor = open(&self.participant, self.to, self.reach);
+        let successor = open(&self.participant, self.opened, self.reach);
         let retired = match successor.and_then(|successor| self.enter(successor)) {
             Ok(retired) => retired,
             Err(error) => {

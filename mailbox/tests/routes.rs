@@ -195,6 +195,28 @@ fn a_way_of_the_lan_goes_before_one_beyond_it_as_soon_as_there_is_one() {
 }
 
 #[test]
+fn a_sender_by_a_router_keeps_to_it_whatever_name_its_packages_are_for() {
+    const BESIDE: Name = Name::new(1, 65, 0, local::TRANSIT);
+    let ground = routed();
+    let mut transit = transit(&ground);
+    let beside = ground.join().receiver(BESIDE, shape(4)).unwrap();
+    let mut sender = ground.join().sender(BESIDE).unwrap();
+    sender.readdress(FAR);
+    send(&mut sender, 1);
+    // The name comes here, and the router's mailbox is another one: each time what was known is old.
+    let mut here = ground.join().receiver(FAR, shape(4)).unwrap();
+    send(&mut sender, 2);
+    beside.close();
+    let mut beside = ground.join().receiver(BESIDE, shape(4)).unwrap();
+    send(&mut sender, 3);
+    let came = beside.try_receive().map(|package| (package.head().to, package.head().id));
+    assert_eq!(came, Some((FAR, 3)), "1 and 2 were lost with their mailbox");
+    assert!(here.try_receive().is_none() && transit.try_receive().is_none());
+    beside.close();
+    assert!(matches!(sender.send(&label(LOW, 4), &[]), Err(SendError::NoMailbox(_))), "no other way is taken");
+}
+
+#[test]
 fn one_participant_sends_to_as_many_far_mailboxes_as_the_router_has_claims() {
     let ground = routed();
     let mut transit = transit(&ground);

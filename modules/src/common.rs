@@ -117,7 +117,7 @@ pub enum State {
 impl From<ModuleState> for State {
     fn from(state: ModuleState) -> Self {
         match state {
-            ModuleState::Starting => Self::Starting,
+            ModuleState::Starting | ModuleState::StandsBy => Self::Starting,
             ModuleState::Off => Self::Off,
             ModuleState::On => Self::On,
             ModuleState::Error => Self::Error,

@@ -6,6 +6,8 @@ mod replay;
 mod router;
 mod slots;
 mod tcp;
+mod team;
+mod team_router;
 mod wormhole;
 
 pub use recorder::{ChannelPage, LostBy, RecordedMessages, Recorder, RecorderInterface, RecorderProxy, RecordingState};
@@ -22,9 +24,15 @@ pub use tcp::{
     BeyondState, BeyondStream, BeyondStreams, BeyondTime, ClassPassed, Tcp, TcpInterface, TcpProxy,
 };
 
+pub use team::{
+    Team, TeamClock, TeamCounts, TeamInterface, TeamMember, TeamNotice, TeamNoticeKind, TeamObject, TeamObjectId,
+    TeamProxy, TeamRefusal, TeamState,
+};
+pub use team_router::{TeamLinks, TeamNode, TeamRouter, TeamRouterInterface, TeamRouterProxy};
+
 pub use wormhole::{
-    CauseCount, ControlDriver, ControlMode, ControlRefusal, ControlState, Supervisor, SupervisorInterface,
-    SupervisorProxy,
+    CauseCount, ControlDriver, ControlMode, ControlRefusal, ControlState, Destination, HeldHalt, Supervisor,
+    SupervisorInterface, SupervisorProxy,
 };
 
 use crate::interface;

@@ -17,12 +17,13 @@ use std::fmt::Display;
 
 const PAGE: &str = include_str!("../../docs/src/wire.md");
 
-/// The bytes of a block: each line begins with pairs of digits, then two spaces and words.
+/// The bytes of a block: each line begins with digits, two a byte, then two spaces and words.
 fn block(name: &str) -> Vec<u8> {
     let fence = format!("\n```hex {name}\n");
     let text = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no ```hex {name}")).split("\n```").next().unwrap();
-    let pairs = text.lines().flat_map(|line| line.split("  ").next().unwrap_or_default().split(' '));
-    pairs.map(|pair| u8::from_str_radix(pair, 16).unwrap_or_else(|_| panic!("{name}: `{pair}`"))).collect()
+    let pairs = text.lines().flat_map(|line| line.split("  ").next().unwrap_or_default().as_bytes().chunks(2));
+    let byte = |pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16);
+    pairs.map(|pair| byte(pair).unwrap_or_else(|_| panic!("{name}: `{pair:?}`"))).collect()
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -55,6 +55,7 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
         },
         tdma: None,
         routes: (1..=255).flat_map(|class| others().map(move |node| route(class, node))).collect(),
+        moving: Default::default(),
         senders: vec![vec![module(200, own)], vec![module(100, own)]],
         hosts: Vec::new(),
         admission: Admission::default(),

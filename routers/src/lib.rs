@@ -18,6 +18,7 @@
 //!    `admission`: what may enter. `security`: seals, challenge and response, before `inbound`.
 //! 2. `time`: master, follower, election. `tdma`: the scheduler of time slots.
 //! 3. `session`, `tcp`: clients and server beyond the LAN. `shell`: threads and sockets of the LAN.
+//!    `team`: other systems without a server.
 //! 4. `driver`: what the threads that send, receive and keep time do, over clock, mailbox and wire.
 //! 5. `replication`: streams of one node on others.
 //! 6. `stats`, `flows`, `report`: what is counted and reported. `impair`, `lab`: a bad network, nodes in namespaces.
@@ -43,6 +44,7 @@ pub mod intake;
 pub mod lab;
 pub mod latencies;
 pub mod link;
+pub mod moving;
 mod netlink;
 pub mod outbound;
 mod port;
@@ -56,4 +58,5 @@ pub mod shell;
 pub mod stats;
 pub mod tcp;
 pub mod tdma;
+pub mod team;
 pub mod time;

@@ -6,11 +6,13 @@ use crate::admission::{Admission, ArrivalPath, capped};
 use crate::counts::Cause;
 use crate::flows::Flow;
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
+use crate::moving::MovingNames;
 use crate::tdma::{LATE_NS, Wire};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Head, Name};
 use rohrpost_network::{Network, Route, Security, Tdma};
 use std::net::IpAddr;
+use std::sync::Arc;
 
 /// Least quota of a sender: two of the largest packages.
 pub const QUOTA_BYTES_MIN: usize = 128 * 1024;
@@ -48,6 +50,8 @@ pub struct Settings {
     pub tdma: Option<Tdma>,
     /// The node of each name that is not on this node; sorted, without overlap.
     pub routes: Vec<Route>,
+    /// Names that move from node to node with their module; not among `routes`.
+    pub moving: Arc<MovingNames>,
     /// The modules of this node: the names of a group share a quota, and so do all other names.
     pub senders: Vec<Vec<Name>>,
     /// The names of this node, with all their mailboxes, as ranges that do not overlap: packages from others to other
@@ -105,6 +109,7 @@ impl Settings {
             network,
             tdma: installation.tdma.clone(),
             routes: installation.routes_from(node),
+            moving: Arc::new(MovingNames::new(installation.moving_names(), installation.lan_nodes().len())),
             senders: installation.modules_on(node).map(|module| module.names().collect()).collect(),
             hosts: installation.names_on(node),
             admission: Admission::new(installation, node),
@@ -151,15 +156,20 @@ impl Settings {
 
     /// The node of a name; none for names of this node and for unknown ones.
     pub fn node_of(&self, name: Name) -> Option<NodeIndex> {
+        if let Some(node) = self.moving.node_of(name) {
+            return node.filter(|node| *node != self.own);
+        }
         let after = self.routes.partition_point(|route| route.first <= name);
         let route = self.routes.get(after.checked_sub(1)?)?;
         (name <= route.last).then_some(route.node)
     }
 
     /// Why a package of a node is refused, whatever its mailbox allows. A right seal proves the sending node, and a
-    /// node may send from its own names alone. Without seals anybody can claim to be any node.
+    /// node may send from its own names alone. Without seals anybody can claim to be any node; but what comes from a
+    /// node where a moving name is no more is late, whatever it claims.
     pub fn refuses(&self, node: NodeIndex, head: &Head, body: &[u8]) -> Option<Cause> {
-        let is_its_name = !self.is_sealed() || self.node_of(head.from) == Some(node);
+        let may_lie = !self.is_sealed() && self.moving.node_of(head.from).is_none();
+        let is_its_name = may_lie || self.node_of(head.from) == Some(node);
         self.admission.validate(ArrivalPath::Lan { node, is_its_name }, head, body).err().map(Cause::from)
     }
 

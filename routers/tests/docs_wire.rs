@@ -4,25 +4,27 @@
 
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use rohrpost_routers::frame::{
-    Alive, DescriptionPart, Fragment, Frame, FrameHead, FrameKind, RecordPart, Refusal, RefusalReason, ReplicaFrame,
-    VERSION,
+    Alive, DescriptionPart, Fragment, Frame, FrameHead, FrameKind, HEAD_BYTES, RecordPart, Refusal, RefusalReason,
+    ReplicaFrame, VERSION, write_check,
 };
 use rohrpost_routers::security::Port;
 use rohrpost_routers::session::frame::{HOPS_MAX, SessionFrameHead, SessionMessage};
 use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, HANDSHAKE_MAX_NS};
 use rohrpost_routers::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
+use rohrpost_routers::team::{Beat, Echo, TeamHead, TeamKind};
 use rohrpost_routers::time::Term;
 use rohrpost_routers::time::message::{Reply, Request, Sync, TimeMessage};
 
 const PAGE: &str = include_str!("../../docs/src/wire.md");
 
-/// The bytes of a block: each line begins with pairs of digits, then two spaces and words.
+/// The bytes of a block: each line begins with digits, two a byte, then two spaces and words.
 fn block(name: &str) -> Vec<u8> {
     let fence = format!("\n```hex {name}\n");
     let text = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no ```hex {name}"));
     let lines = text.split("\n```").next().unwrap().lines();
-    let pairs = lines.flat_map(|line| line.split("  ").next().unwrap_or_default().split(' '));
-    pairs.map(|pair| u8::from_str_radix(pair, 16).unwrap_or_else(|_| panic!("{name}: `{pair}`"))).collect()
+    let pairs = lines.flat_map(|line| line.split("  ").next().unwrap_or_default().as_bytes().chunks(2));
+    let byte = |pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16);
+    pairs.map(|pair| byte(pair).unwrap_or_else(|_| panic!("{name}: `{pair:?}`"))).collect()
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -129,6 +131,35 @@ fn what_carries_no_package_has_the_documented_bytes() {
     let refusal = Refusal { version: VERSION, reason: RefusalReason::Digest, digest: HEAD.digest };
     let head = FrameHead { kind: FrameKind::Refusal, ..HEAD };
     check("refusal", head, &refusal.to_bytes(), |frame| assert_eq!(frame, Frame::Refusal(refusal)));
+}
+
+/// Reads a block of a team, and compares it with what is written.
+fn check_team(name: &str, head: TeamHead, rest: &[u8]) {
+    let there = block(name);
+    assert_eq!(TeamHead::read(&there), Ok((head, 0)), "{name}");
+    let mut written = vec![0; HEAD_BYTES];
+    head.write(&mut written);
+    written.extend(rest);
+    write_check(&mut written);
+    if cfg!(target_endian = "little") {
+        assert_eq!(hex(&there), hex(&written), "{name}: left the page, right the code");
+    }
+}
+
+#[test]
+fn datagrams_between_systems_have_the_documented_bytes() {
+    let (common, incarnation) = (HEAD.digest, HEAD.incarnation);
+    let head = TeamHead { kind: TeamKind::Package, system: 1, node: 0, to: 255, common, incarnation, sequence: 7 };
+    let to = Name::new(255, 200, 0, 2);
+    let package = Head { to, from: PILOT, ..data(3) };
+    check_team("team-package", head, &[&package.to_bytes()[..], &[1, 2, 3]].concat());
+    let mut beat = Vec::new();
+    let echo = Echo { system: 2, node: 0, challenge: 0x0102_0304_0506_0708 };
+    Beat::write(HEAD.digest, 2, [echo].into_iter(), &mut beat);
+    check_team("team-beat", TeamHead { kind: TeamKind::Beat, sequence: 8, ..head }, &beat);
+    let there = block("team-beat");
+    let read = Beat::parse(&there[HEAD_BYTES..]).unwrap();
+    assert_eq!((read.challenge, read.sent, read.echoes().collect::<Vec<_>>()), (HEAD.digest, 2, vec![echo]));
 }
 
 #[test]

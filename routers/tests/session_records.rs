@@ -27,8 +27,8 @@ const STAMP_NS: u64 = 1_700_000_000_000_000_000;
 /// The description of the page, which has a stream `steps`.
 fn description() -> Vec<u8> {
     let text = PAGE.split("\n```hex description\n").nth(1).unwrap().split("\n```").next().unwrap();
-    let pairs = text.lines().flat_map(|line| line.split("  ").next().unwrap_or_default().split(' '));
-    pairs.map(|pair| u8::from_str_radix(pair, 16).unwrap()).collect()
+    let pairs = text.lines().flat_map(|line| line.split("  ").next().unwrap_or_default().as_bytes().chunks(2));
+    pairs.map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -42,6 +42,20 @@ fn numbers_below_zero_and_texts_that_begin_as_json_are_values() {
 }
 
 #[test]
+fn a_command_of_ros_2_is_answered_by_ours() {
+    let place = Place::new();
+    for (words, ours) in [
+        (&["topic", "list"][..], "here it is: rohrpost graph"),
+        (&["topic", "echo", "/scan", "--once"], "here it is: rohrpost echo MODULE [DATA]"),
+        (&["service", "call", "/drive"], "here it is: rohrpost call MODULE FUNCTION"),
+        (&["bag"], "\n  bag record rohrpost record on\n"),
+    ] {
+        let said = place.say(words);
+        assert!(said.code == Some(2) && said.err.contains(ours) && said.out.is_empty(), "{said:?}");
+    }
+}
+
+#[test]
 fn a_class_is_its_one_module_in_all_tools_and_of_several_all_are_named() {
     let (place, launch, _robot) = Place::running(&[OUTPUT, &tuned("probe.0", "", "")]);
     wait("its data are described", || place.say(&["hz", "probe", "--window", "0.2", "--count", "1"]).code);

@@ -53,8 +53,9 @@ const SAID: [(usize, &str); 12] = [
     ),
     (
         5,
-        "module `motor.0`: settings: unknown field `beems`, expected one of `map`, `cell-m`, `seed`, `laser-rate-hz`, \
-     `laser-noise-m`, `odometry-rate-hz`, `camera-rate-hz`, `depth-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
+        "module `motor.0`: settings: unknown field `beems`, expected one of `map`, `arena`, `cell-m`, `seed`, \
+     `laser-rate-hz`, `laser-noise-m`, `odometry-rate-hz`, `camera-rate-hz`, `depth-rate-hz`, `scanner`, `beams`, \
+     `range-max-m`, `dead-man-ms`",
     ),
     (9, "module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, out of range: 0.01..=100 Hz"),
     (16, "module `pilot.0`: settings: `motor` is `motor.0`, which `calls` does not name; add \"motor.0\" to `calls`"),

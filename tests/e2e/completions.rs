@@ -68,7 +68,7 @@ fn bash_offers_what_the_running_node_has() {
     assert_eq!(offered(&place, &["rohrpost", "status", "pro"]), ["probe.0"]);
     assert_eq!(offered(&place, &["rohrpost", "log", "--module", "o"]), ["output.0"]);
     assert_eq!(offered(&place, &["rohrpost", "log", "--level", "d"]), ["debug"]);
-    assert_eq!(offered(&place, &["rohrpost", "run", "m"]), ["mapper"]);
+    assert_eq!(offered(&place, &["rohrpost", "run", "ma"]), ["mapper"]);
     // From modules' own descriptions, built in or the user's.
     assert_eq!(offered(&place, &["rohrpost", "call", "output.0", "li"]), ["lines_from"]);
     assert_eq!(offered(&place, &["rohrpost", "echo", "output.0", ""]), ["line"]);

@@ -23,7 +23,7 @@ use std::time::Instant;
 use tempfile::TempDir;
 
 /// The command under test.
-const ROHRPOST: &str = env!("CARGO_BIN_EXE_rohrpost");
+pub(crate) const ROHRPOST: &str = env!("CARGO_BIN_EXE_rohrpost");
 
 /// Head of all configurations: no real-time scheduling, so that tests run beside each other.
 fn head_of(installation: &str, classes: &str) -> String {

@@ -118,7 +118,7 @@ fn configured(security: &str) -> String {
 #[test]
 fn a_laptop_with_python_alone_drives_the_robot_and_is_called_from_there() {
     let Some(scene) = Scene::launched(SEALED) else { return };
-    let mut gripper = scene.book("gripper.py");
+    let mut gripper = scene.book("hosted.py");
     gripper.wait_for("hosted");
     let drove = scene.book("drive.py").said().ok();
     let lines: Vec<&str> = drove.lines().collect();

@@ -1,9 +1,11 @@
 //! Several nodes of one place, each with a launch of its own; where there is a lab, each in a namespace of it.
 
-use crate::harness::{Place, Robot, lacks_namespaces, python, until};
+use crate::harness::{Place, Robot, lacks_namespaces, python, runs, signal, until};
 use crate::process::{Running, Said};
+use nix::sys::signal::Signal;
 use rohrpost_routers::lab::Lab;
 use serde_json::Value;
+use std::ffi::OsString;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU16, Ordering};
@@ -60,13 +62,15 @@ pub(crate) struct Network {
     pub(crate) config: PathBuf,
     /// How the network is made worse for what is launched from now on.
     pub(crate) impair: &'static str,
+    /// Further environment of what is launched from now on.
+    pub(crate) environment: Vec<(&'static str, OsString)>,
     lab: Option<Lab>,
 }
 
 impl Network {
     /// None is launched yet.
     pub(crate) fn new(place: Place, config: PathBuf, lab: Option<Lab>) -> Self {
-        Self { nodes: Vec::new(), place, config, impair: "", lab }
+        Self { nodes: Vec::new(), place, config, impair: "", environment: Vec::new(), lab }
     }
 
     pub(crate) fn impaired(self, impair: &'static str) -> Self {
@@ -88,6 +92,7 @@ impl Network {
     pub(crate) fn launch_from(&mut self, config: &Path, nodes: &[&'static str]) {
         let begin = |node: &&'static str| {
             let mut command = self.place.command(&["launch", config.to_str().unwrap(), "--node", node]);
+            command.envs(self.environment.iter().cloned());
             if !self.impair.is_empty() {
                 command.env("ROHRPOST_IMPAIR", self.impair);
             }
@@ -133,6 +138,18 @@ impl Network {
     /// Python at a node's computer.
     pub(crate) fn python(&self, node: &str, arguments: &[&str]) -> Running {
         self.inside(node, || Running::start(python(&self.place, arguments)))
+    }
+
+    /// Kills all processes of a node, as a cut of its power does, or its launch alone: then its modules end themselves.
+    pub(crate) fn kill(&mut self, node: &str, with_modules: bool) {
+        let at = self.nodes.iter().position(|(name, ..)| *name == node).unwrap();
+        let (_, mut launch, robot) = self.nodes.remove(at);
+        let pids = robot.pids();
+        if with_modules {
+            pids.iter().for_each(|pid| signal(*pid, Signal::SIGKILL));
+        }
+        launch.kill();
+        until("its processes have ended", || !pids.iter().any(|pid| runs(*pid)));
     }
 
     /// Ends a node in order.

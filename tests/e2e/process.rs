@@ -229,6 +229,9 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("{} said:\n{}{}", self.asked, self.out(), self.err());
+        }
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

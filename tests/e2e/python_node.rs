@@ -11,7 +11,7 @@ const MEDDLING: &str = include_str!("python/meddling.py");
 /// Streams of the faulty program, with room for records that lie in place.
 const STREAMS: &str = "[module.stream.wide]\nrecord = \"64 KiB\"\n[module.stream.object]\nrecord = \"64 KiB\"\n";
 const OVER: &str = "of it: BufferError: the record of these bytes is in hand no more";
-const PAGE: &str = include_str!("../../docs/src/python-node.md");
+const PAGE: &str = include_str!("../../docs/src/python.md");
 const CLASSES: &str = "motor 200, odometry 160, laser 150, camera 120, gripper 110, output 32, tool 16";
 const CONFIG: &str = r#"
 [nodes.main]

@@ -4,6 +4,7 @@ use crate::harness::{OUTPUT, Place, Robot, probe, until, wait};
 use crate::network::{NETWORK, addresses, at, nodes};
 use crate::process::{Running, Said};
 use rohrpost_mailbox::{SystemClock, realtime_ns};
+use std::ffi::OsString;
 use std::fs::OpenOptions;
 use std::io::{Seek, Write};
 use std::path::PathBuf;
@@ -11,16 +12,15 @@ use std::process::Command;
 
 const DAY_S: i64 = 86_400;
 
-/// A computer with a clock that can be set.
-struct Computer {
-    place: Place,
+/// A wall clock that can be set, for the programs that are shown it.
+pub(crate) struct WallClock {
     library: PathBuf,
+    file: PathBuf,
 }
 
-impl Computer {
-    /// It shows this time, s since 1970.
-    fn at(time_s: i64) -> Self {
-        let place = Place::new();
+impl WallClock {
+    /// A clock that shows the right time.
+    pub(crate) fn new(place: &Place) -> Self {
         let library = place.path("set_clock.so");
         let source = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/e2e/set_clock.c");
         let compiler = Command::new("cc")
@@ -30,22 +30,46 @@ impl Computer {
             .output();
         let compiler = compiler.unwrap();
         assert!(compiler.status.success(), "{}", String::from_utf8_lossy(&compiler.stderr));
-        let computer = Self { place, library };
-        computer.set(time_s - now_s());
-        computer
+        let clock = Self { library, file: place.path("clock") };
+        clock.set(0);
+        clock
     }
 
-    /// Sets its clock to so many seconds from the right time. Programs that run see the same file.
-    fn set(&self, by_s: i64) {
-        let mut file =
-            OpenOptions::new().write(true).create(true).truncate(false).open(self.place.path("clock")).unwrap();
+    /// Sets it to so many seconds from the right time. Programs that run see the same file.
+    pub(crate) fn set(&self, by_s: i64) {
+        let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(&self.file).unwrap();
         file.rewind().unwrap();
         file.write_all(&by_s.to_ne_bytes()).unwrap();
     }
 
+    /// Environment of a program to which it is shown, and to those that this starts.
+    pub(crate) fn environment(&self) -> [(&'static str, OsString); 2] {
+        [("LD_PRELOAD", self.library.clone().into()), ("ROHRPOST_TEST_CLOCK", self.file.clone().into())]
+    }
+}
+
+/// A computer with a clock that can be set.
+struct Computer {
+    place: Place,
+    clock: WallClock,
+}
+
+impl Computer {
+    /// A computer of which the clock shows this time, s since 1970.
+    fn at(time_s: i64) -> Self {
+        let place = Place::new();
+        let computer = Self { clock: WallClock::new(&place), place };
+        computer.set(time_s - now_s());
+        computer
+    }
+
+    fn set(&self, by_s: i64) {
+        self.clock.set(by_s);
+    }
+
     fn command(&self, arguments: &[&str]) -> Command {
         let mut command = self.place.command(arguments);
-        command.env("LD_PRELOAD", &self.library).env("ROHRPOST_TEST_CLOCK", self.place.path("clock"));
+        command.envs(self.clock.environment());
         command
     }
 

@@ -29,11 +29,13 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         "param" | "stream" => &["list"],
         "interface" => &["export", "probe.0"],
         "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run"
-        | "keys" | "record" | "replay" => {
+        | "keys" | "man" | "record" | "replay" | "path" | "entrances" | "arena" | "bundle" => {
             return None;
         }
-        // Of several nodes, see `lan`; of several systems, see `beyond`.
-        "net" | "time" | "router" | "tcp-router" | "tcp-client" => return None,
+        // Of a robot with a wormhole, see `supervised`.
+        "halt" | "resume" => return None,
+        // Of several nodes, see `lan`; of several systems, see `beyond` and `team`.
+        "net" | "time" | "router" | "tcp-router" | "tcp-client" | "team-router" | "team" => return None,
         other => panic!("`{other}` is new: say here how it is tested"),
     };
     Some([&[command], after].concat())
@@ -43,6 +45,18 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
 fn node() -> (Place, Running) {
     let (place, launch, _) = Place::running(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);
     (place, launch)
+}
+
+#[test]
+fn each_command_has_a_manual_page() {
+    let place = Place::new();
+    let folder = place.path("deep/man1");
+    place.say(&["man", folder.to_str().unwrap()]).ok();
+    for command in commands(&place) {
+        let page = std::fs::read_to_string(folder.join(format!("rohrpost-{command}.1"))).unwrap();
+        assert!(page.contains("\n.SH SYNOPSIS\n") && page.contains("\n.SH OPTIONS\n"), "{command}: {page}");
+    }
+    place.say(&["man", "/proc/man1"]).fails_with(["/proc/man1: ", "name a folder that you may write"]);
 }
 
 #[test]
@@ -195,12 +209,12 @@ fn tools_say_what_to_do_while_nothing_runs() {
     let said = place.say(&["run", "mop", "--config", config.to_str().unwrap(), "--name", "output.0"]);
     assert_eq!(said.code, Some(2), "{said:?}");
     assert!(
-        said.err.contains("'mop'") && said.err.contains("sim, carmen, mapper, pilot, wormhole, output"),
+        said.err.contains("'mop'") && said.err.contains("sim, carmen, mapper, pilot, mischief, wormhole, team, output"),
         "{said:?}"
     );
     let help = place.say(&["run", "--help"]).ok();
     let words: Vec<&str> = help.split_whitespace().collect();
-    assert!(words.join(" ").contains("sim, carmen, mapper, pilot, wormhole, output"), "{help}");
+    assert!(words.join(" ").contains("sim, carmen, mapper, pilot, mischief, wormhole, team, output"), "{help}");
     place.assert_empty();
 }
 

@@ -2,6 +2,7 @@
 
 use crate::cargo;
 use crate::failure::Failure;
+use crate::files::{copy_into, read, write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -14,37 +15,30 @@ pub(crate) fn install(args: &[String]) -> Result<ExitCode, Failure> {
         return Err("cargo xtask c-client takes the folder to install into, such as /usr/local".into());
     };
     let prefix = std::path::absolute(prefix).map_err(|error| format!("{prefix}: {error}"))?;
-    // Without Rust's own kind of library, beside which nothing is optimised as a whole.
-    let build = ["rustc", "--release", "--package", "rohrpost-c", "--lib", "--crate-type", "cdylib,staticlib"];
-    cargo::run("building the library for C", &mut cargo::cargo(&build))?;
-    let (source, built) = (cargo::root().join("clients/c"), cargo::target().join("release"));
-    let [headers, libraries] = ["include", "lib"].map(|folder| prefix.join(folder));
-    let descriptions = libraries.join("pkgconfig");
-    for header in HEADERS {
-        copy(&source.join("include").join(header), &headers)?;
-    }
-    for library in ["librohrpost_c.so", "librohrpost_c.a"] {
-        copy(&built.join(library), &libraries)?;
-    }
-    let template = read(&source.join("rohrpost.pc.in"))?;
-    let text = template.replace("@PREFIX@", &prefix.to_string_lossy()).replace("@VERSION@", env!("CARGO_PKG_VERSION"));
-    let description = descriptions.join("rohrpost.pc");
-    let written = std::fs::create_dir_all(&descriptions).and_then(|()| std::fs::write(&description, text));
-    written.map_err(|error| format!("{}: {error}", description.display()))?;
+    build()?;
+    let built = cargo::target().join("release");
+    place(&built, &["librohrpost_c.so", "librohrpost_c.a"], &prefix, &prefix.to_string_lossy())?;
     println!("installed below {}; compilers find it by: pkg-config --cflags --libs rohrpost", prefix.display());
     Ok(ExitCode::SUCCESS)
 }
 
-fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
+/// Builds the shared and the static library, optimised.
+pub(crate) fn build() -> Result<(), Failure> {
+    // Without Rust's own kind of library, beside which nothing is optimised as a whole.
+    let build = ["rustc", "--release", "--package", "rohrpost-c", "--lib", "--crate-type", "cdylib,staticlib"];
+    cargo::run("building the library for C", &mut cargo::cargo(&build))
 }
 
-fn copy(file: &Path, folder: &Path) -> Result<(), Failure> {
-    let copied = std::fs::create_dir_all(folder).and_then(|()| {
-        let target = folder.join(file.file_name().unwrap_or_default());
-        // A library that runs is replaced by another, not changed.
-        let _ = std::fs::remove_file(&target);
-        std::fs::copy(file, target)
-    });
-    copied.map(drop).map_err(|error| format!("{} into {}: {error}", file.display(), folder.display()))
+/// Puts headers, built libraries and their description below a folder, which the description calls `prefix`.
+pub(crate) fn place(built: &Path, libraries: &[&str], folder: &Path, prefix: &str) -> Result<(), Failure> {
+    let source = cargo::root().join("clients/c");
+    for header in HEADERS {
+        copy_into(&source.join("include").join(header), &folder.join("include"))?;
+    }
+    for library in libraries {
+        copy_into(&built.join(library), &folder.join("lib"))?;
+    }
+    let template = read(&source.join("rohrpost.pc.in"))?;
+    let text = template.replace("@PREFIX@", prefix).replace("@VERSION@", env!("CARGO_PKG_VERSION"));
+    write(&folder.join("lib/pkgconfig/rohrpost.pc"), &text)
 }

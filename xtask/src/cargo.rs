@@ -92,3 +92,13 @@ pub(crate) fn shown(command: &Command) -> String {
     let words = std::iter::once(name).chain(command.get_args());
     words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
 }
+
+/// The output of a program that must succeed.
+pub(crate) fn output(command: &mut Command) -> Result<String, Failure> {
+    let said = command.output().map_err(|error| format!("cannot run `{}`: {error}", shown(command)))?;
+    if !said.status.success() {
+        let why = String::from_utf8_lossy(&said.stderr).trim_end().to_owned();
+        return Err(format!("`{}` ended with {}: {why}", shown(command), said.status));
+    }
+    String::from_utf8(said.stdout).map_err(|_| format!("`{}` printed what is no text", shown(command)))
+}

@@ -9,6 +9,7 @@
 use crate::cargo::{self, BRIDGE, cargo, checked};
 use crate::failure::Failure;
 use crate::parts;
+use crate::release::{self, Profile};
 use crate::report;
 use crate::stages::{self, Done, Stage};
 use crate::venv;
@@ -17,9 +18,9 @@ use std::process::{Command, ExitCode};
 
 /// The bench, with its peers: some 70 crates.
 const BENCH: &str = "rohrpost-bench";
-/// The models of the slot core. Their model checker asks for features of others' crates, with which Cargo would compile
-/// ours once more.
-const LOOM: &str = "rohrpost-proof-loom";
+/// The models of the slot core, of supervision and of teams. Their model checkers ask for features of others' crates,
+/// with which Cargo would compile ours once more.
+const MODELS: [&str; 3] = ["rohrpost-proof-loom", "rohrpost-proof-supervision", "rohrpost-proof-team"];
 
 /// `cargo xtask test [--all]`: what a change to the product may break, or all tests.
 pub(crate) fn test(args: &[String]) -> Result<ExitCode, Failure> {
@@ -44,7 +45,7 @@ const LINTS: [Stage; 2] = [
     },
     Stage {
         name: "build of all, by clippy",
-        budget_s: 1500,
+        budget_s: 1650,
         run: || {
             let all = ["test", "--workspace", "--no-run", "--no-fail-fast"];
             let counted = ["test", "--workspace", "--bench", "instructions", "--bench", "instructions-c", "--no-run"];
@@ -59,29 +60,39 @@ const LINTS: [Stage; 2] = [
 const PRODUCT: [Stage; 2] = [
     Stage {
         name: "tests of the product",
-        budget_s: 2000,
+        budget_s: 2700,
         run: || {
-            let left_out = ["--exclude", BRIDGE, "--exclude", BENCH, "--exclude", LOOM];
-            let most = [&["test", "--workspace", "--no-fail-fast"], &left_out[..]].concat();
+            let left_out = [BRIDGE, BENCH].into_iter().chain(MODELS).flat_map(|package| ["--exclude", package]);
+            let most: Vec<&str> = ["test", "--workspace", "--no-fail-fast"].into_iter().chain(left_out).collect();
             parts::run("testing all but the GUI bridge and the bench with its peers", tests(&most))
         },
     },
     Stage {
-        name: "models of the slot core",
-        budget_s: 300,
-        run: || parts::run("testing models of the slot core", tests(&["test", "--package", LOOM, "--no-fail-fast"])),
+        name: "models of slots, supervision and teams",
+        budget_s: 500,
+        run: || {
+            let packages = MODELS.into_iter().flat_map(|package| ["--package", package]);
+            let all: Vec<&str> = ["test", "--no-fail-fast"].into_iter().chain(packages).collect();
+            parts::run("testing models of the slot core, of supervision and of teams", tests(&all))
+        },
     },
 ];
 
-const ALL: [Stage; 7] = [
+const ALL: [Stage; 9] = [
     Stage {
         name: "tests",
-        budget_s: 1800,
+        budget_s: 2500,
         run: || parts::run("testing all", tests(&["test", "--workspace", "--no-fail-fast"])),
     },
     Stage { name: "drawings, with Rerun's command line", budget_s: 220, run: || whole(drawings()) },
     Stage { name: "recordings, with Python's reader", budget_s: 30, run: || whole(recordings()) },
     Stage { name: "the client in Python, installed, with mypy", budget_s: 170, run: || whole(python_client()) },
+    Stage {
+        name: "packages, installed where nothing is",
+        budget_s: 100,
+        run: || whole(release::run(Profile::Dev, false)),
+    },
+    Stage { name: "crates, packed for crates.io", budget_s: 30, run: || whole(release::crates_io::pack()) },
     Stage { name: "ThreadSanitizer", budget_s: 40, run: || whole(tsan::run().map(drop)) },
     Stage { name: "instructions of the hot paths", budget_s: 380, run: || whole(instructions::check()) },
     Stage { name: "fuzzing, short", budget_s: 470, run: || whole(fuzz::short()) },

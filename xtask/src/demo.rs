@@ -21,7 +21,7 @@ impl BridgeBuild {
     /// The rule. A robot that runs until Ctrl-C does not wait for its picture. With any other option the demo ends by
     /// itself, needs the drawing from its beginning, or has other modules: then the bridge is built first.
     fn of(args: &[String]) -> Self {
-        let is_without = |arg: &String| ["--no-gui", "--help", "-h"].contains(&arg.as_str());
+        let is_without = |arg: &String| ["--no-gui", "--chaos", "--help", "-h"].contains(&arg.as_str());
         match () {
             () if args.iter().any(is_without) => Self::Never,
             () if args.iter().all(|arg| arg == "--quiet") => Self::Beside,
@@ -78,6 +78,7 @@ mod tests {
             ("--no-gui", BridgeBuild::Never, "as asked"),
             ("--seconds 5 --no-gui", BridgeBuild::Never, "as asked"),
             ("--help", BridgeBuild::Never, "nothing runs"),
+            ("--nodes 3 --chaos 7 --seconds 60", BridgeBuild::Never, "it draws nothing"),
             ("--seconds 60", BridgeBuild::First, "it may end before the bridge is there"),
             ("--log FILE", BridgeBuild::First, "a log ends"),
             ("--viewer", BridgeBuild::First, "the picture is what was asked for"),

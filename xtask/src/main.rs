@@ -4,17 +4,21 @@
 //! anything else, and that should take a second.
 #![forbid(unsafe_code)]
 
+mod bench_page;
 mod beside;
 mod c_client;
+mod campaign;
 mod cargo;
 mod checks;
 mod crates;
 mod demo;
 mod failure;
+mod files;
 mod fuzz;
 mod instructions;
 mod parts;
 mod picture;
+mod release;
 mod report;
 mod stages;
 mod tsan;
@@ -38,10 +42,18 @@ cargo xtask fuzz [TARGET...] [--seconds N] | --short
     Fuzzes each target, or those named, for so long (60 s), from where the last run ended; or as the tests do, a little.
 cargo xtask instructions [--record]
     Counts instructions of the hot paths with callgrind and compares them with recorded ceilings, or records these.
+cargo xtask campaign [--runs N] [--seed S]
+    Lets programs, processes, scanner, clock and network of the supervised robot fail, one run for each seed from S on
+    (10 from 0 on), and the same without the wormhole. A run that fails prints its seed and its faults.
 cargo xtask tsan
     Runs the mailbox's slot core, and broken variants of it, under ThreadSanitizer.
 cargo xtask c-client DIR
     Builds the library for C and C++, and installs it with its headers and pkg-config file below DIR.
+cargo xtask release [--profile dev] [--bridge]
+    Builds, and packs into target/dist, a .deb, a tarball, and a wheel of the Python package with the command in it;
+    installs them in an empty root and in a fresh venv, and runs a demo there. --bridge adds the GUI bridge to them.
+cargo xtask bench-page
+    Writes the tables of docs/src/bench.md from benches/results.
 cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]
     A picture of a drawing as its viewer shows it, without a screen.
 ";
@@ -56,8 +68,11 @@ fn main() -> ExitCode {
         "ci" => Ok(checks::ci()),
         "fuzz" => fuzz::run(rest),
         "instructions" => instructions::command(rest),
+        "campaign" => campaign::run(rest),
         "tsan" => tsan::run(),
         "c-client" => c_client::install(rest),
+        "release" => release::command(rest),
+        "bench-page" => bench_page::command(rest),
         "picture" => picture::run(rest),
         "help" | "--help" | "-h" => {
             print!("{HELP}");

@@ -14,9 +14,9 @@ const PACKAGE: &str = "rerun-sdk==0.36.3";
 /// one that writes bags as rosbag2 does.
 const MCAP_PACKAGES: &str = "mcap==1.6.0 mcap-protobuf-support==0.6.0 protobuf==7.36.2 rosbags==0.11.9";
 
-/// What checks the types of the client in Python, and what builds its package, with and without Rust; and numpy, since
-/// arrays are views of its records.
-const CLIENT_PACKAGES: &str = "mypy==1.13.0 hatchling==1.27.0 maturin==1.16.0 numpy==2.4.6";
+/// What checks the types of the client in Python, and what builds and packs its package, with and without Rust; and
+/// numpy, since arrays are views of its records.
+const CLIENT_PACKAGES: &str = "mypy==1.13.0 hatchling==1.27.0 maturin==1.16.0 numpy==2.4.6 wheel==0.45.1";
 
 /// A Python with Rerun in it.
 pub(crate) struct Venv {

@@ -3,19 +3,23 @@
 mod cost;
 mod errors;
 mod flood;
+pub mod grid;
 pub mod lan;
 pub mod languages;
 mod latency;
 mod many;
 mod memory;
+pub mod plan;
 mod proof;
 mod rates;
 pub mod recording;
 mod rivals;
 mod startup;
 pub mod streams;
+pub mod supervision;
 pub mod tcp;
 pub mod tdma;
+pub mod team;
 
 use rohrpost_bench_local::{Case, Failure};
 

@@ -24,13 +24,6 @@ impl Load {
         from: impl FnOnce() -> Result<Datagrams, Failure>,
         to: impl FnOnce() -> Result<Datagrams, Failure>,
     ) -> Result<Self, Failure> {
-        let work = || {
-            Child::start(|| {
-                loop {
-                    std::hint::black_box(monotonic_ns());
-                }
-            })
-        };
         let swamp = Child::start(|| {
             let mut datagrams = to()?;
             let mut message = vec![0; BYTES];
@@ -50,6 +43,18 @@ impl Load {
                 std::thread::sleep(EACH);
             }
         })?;
-        Ok(Self { _children: [work()?, work()?, swamp, flooder] })
+        Ok(Self { _children: [busy_loop()?, busy_loop()?, swamp, flooder] })
     }
+}
+
+/// An ordinary process that works until it is dropped.
+///
+/// # Errors
+/// When there can be no further process.
+pub fn busy_loop() -> Result<Child, Failure> {
+    Child::start(|| {
+        loop {
+            std::hint::black_box(monotonic_ns());
+        }
+    })
 }

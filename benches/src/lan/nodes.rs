@@ -2,7 +2,7 @@
 
 use super::ends::{Module, await_way};
 use super::records::{self, RECORDS};
-use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all, make_keys};
+use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all, make_keys, router_of};
 use super::wire::{Wire, address};
 use rohrpost_bench_local::Failure;
 use rohrpost_bench_local::harness::{End, Meetings, OrFail, Placement, Scheduling, Scratch, settle};
@@ -101,7 +101,15 @@ impl Drop for Nodes {
 }
 
 fn spec<'a>(end: End, command: &'a Path, config: &'a Path, scratch: &'a Path) -> RouterSpec<'a> {
-    RouterSpec { command, config, installation: INSTALLATION, node: end.node().into(), index: index(end), scratch }
+    RouterSpec {
+        command,
+        config,
+        installation: INSTALLATION,
+        node: end.node().into(),
+        program: "router",
+        module: router_of(index(end)),
+        scratch,
+    }
 }
 
 /// Of the node in the configuration, and so of its router.

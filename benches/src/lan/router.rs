@@ -1,4 +1,5 @@
-//! One real router, as launch would start it: `rohrpost router`, at its node's place on the network.
+//! One real router, as launch would start it: `rohrpost router` or `rohrpost team-router`, at its node's place on the
+//! network.
 
 use nix::sys::signal::Signal;
 use rohrpost_bench_local::Failure;
@@ -14,11 +15,17 @@ use std::time::{Duration, Instant};
 pub const SYSTEM: u8 = 1;
 /// Class of routers.
 pub const ROUTER: Class = Class(250);
+
 /// Reading a configuration and making a mailbox takes milliseconds, on a busy computer a second.
 const READY_WITHIN: Duration = Duration::from_secs(20);
 /// A router told to end has told its peers within this time.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 const LOOK_EACH: Duration = Duration::from_millis(5);
+
+/// The router of the LAN at a node's place in the configuration.
+pub fn router_of(node: u8) -> Name {
+    Name::new(SYSTEM, ROUTER.0, node, local::COMMANDS)
+}
 
 /// Which router.
 pub struct RouterSpec<'a> {
@@ -30,8 +37,10 @@ pub struct RouterSpec<'a> {
     pub installation: &'a str,
     /// The node in it.
     pub node: String,
-    /// Place of the node in it, from 0.
-    pub index: u8,
+    /// Subcommand that runs it, which is also the word of its class.
+    pub program: &'static str,
+    /// Module that it is; the instance is the place of the node in the configuration, from 0.
+    pub module: Name,
     /// Directories of nodes and output of routers.
     pub scratch: &'a Path,
 }
@@ -52,11 +61,10 @@ impl RouterSpec<'_> {
 /// A router's process; killed when this is dropped.
 pub struct Router {
     child: Child,
-    index: u8,
+    module: Name,
     node: String,
     directory: PathBuf,
     log: PathBuf,
-    transit: Name,
 }
 
 impl Router {
@@ -69,9 +77,9 @@ impl Router {
             prepare()?;
             let log = fs::File::create(spec.log()).or_fail("router's log")?;
             let error = Command::new(spec.command)
-                .args(["router", "--config"])
+                .args([spec.program, "--config"])
                 .arg(spec.config)
-                .args(["--name", &format!("router.{}", spec.index)])
+                .args(["--name", &format!("{}.{}", spec.program, spec.module.instance())])
                 .env("ROHRPOST_DIR", spec.scratch)
                 .stdin(Stdio::null())
                 .stdout(Stdio::null())
@@ -79,9 +87,8 @@ impl Router {
                 .exec();
             Err(Failure::of("rohrpost router", error))
         })?;
-        let transit = Name::new(SYSTEM, ROUTER.0, spec.index, local::TRANSIT);
-        let (index, node) = (spec.index, spec.node.clone());
-        Ok(Self { child, index, node, directory: spec.directory(), log: spec.log(), transit })
+        let (module, node) = (spec.module, spec.node.clone());
+        Ok(Self { child, module, node, directory: spec.directory(), log: spec.log() })
     }
 
     /// Waits until its mailbox for others' packages exists, which it makes last.
@@ -89,7 +96,8 @@ impl Router {
     /// # Errors
     /// Its output, if it ended or did not get ready.
     pub fn await_ready(&mut self) -> Result<(), Failure> {
-        let ready = look_for(READY_WITHIN, LOOK_EACH, || match has_mailbox(&self.directory, self.transit) {
+        let transit = self.module.with_local(local::TRANSIT);
+        let ready = look_for(READY_WITHIN, LOOK_EACH, || match has_mailbox(&self.directory, transit) {
             true => Ok(Some(true)),
             false => Ok(self.child.has_ended()?.then_some(false)),
         })?;
@@ -101,7 +109,7 @@ impl Router {
 
     /// Place of its node in the configuration.
     pub fn index(&self) -> u8 {
-        self.index
+        self.module.instance()
     }
 
     /// Its output.

@@ -5,7 +5,7 @@ use super::counts::Counts;
 use super::plan::{INSTALLATION, Plan};
 use super::rights::Rights;
 use super::stage::{NODES, Place, Stage};
-use crate::lan::router::{Router, RouterSpec, end_all};
+use crate::lan::router::{Router, RouterSpec, end_all, router_of};
 use rohrpost_bench_local::Failure;
 use rohrpost_bench_local::harness::{Machine, OrFail, Scratch, look_for};
 use rohrpost_bench_local::settings::Settings;
@@ -131,5 +131,13 @@ impl Drop for Routers<'_> {
 }
 
 fn spec<'a>(node: u8, command: &'a Path, config: &'a Path, scratch: &'a Path) -> RouterSpec<'a> {
-    RouterSpec { command, config, installation: INSTALLATION, node: Place::Node(node).name(), index: node, scratch }
+    RouterSpec {
+        command,
+        config,
+        installation: INSTALLATION,
+        node: Place::Node(node).name(),
+        program: "router",
+        module: router_of(node),
+        scratch,
+    }
 }

@@ -46,15 +46,17 @@ pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
 /// What a contender may lack here, by words of its note, and what is not tested then. The limits of POSIX queues may be
 /// too small without root, a container may forbid tracing or namespaces or have little shared memory, and commands may
 /// not have been built.
-const EXCUSES: [(&str, &str); 9] = [
+const EXCUSES: [(&str, &str); 11] = [
     ("bytes of shared memory", "benches: streams of half a gigabyte (shared memory)"),
     ("a POSIX queue of", "benches: POSIX queues that are large enough"),
     ("no process may be traced here", "benches: system calls of a send (ptrace)"),
     ("no namespaces here", "benches: cases on a network (network namespaces)"),
     ("no real time for routers here", "benches: routers with real time"),
+    ("no real time here", "benches: deadlines of supervised control (real-time scheduling)"),
     ("name it with --rohrpost", "benches: cases that need the `rohrpost` command"),
     ("--manifest-path benches/zenoh", "benches: zenoh, which is built by hand"),
     ("with --python", "benches: packages for Python, which are installed by hand"),
+    ("no C++ compiler", "benches: the search in C++ (`c++`)"),
     ("cargo rustc --release -p rohrpost-c", "benches: programs in C (the library for C)"),
 ];
 
@@ -114,8 +116,9 @@ const KEYS: [&str; 13] = [
 ];
 
 /// Units for which zero is allowed.
-const COUNTS: [&str; 12] = [
+const COUNTS: [&str; 13] = [
     "a send",
+    "a check",
     "%",
     "slots",
     "packages",
@@ -147,7 +150,7 @@ fn check_row(row: &Map<String, Value>) {
         assert!(figures.is_sorted(), "{row:?}");
     }
     // These may be missing where ours is there.
-    let may_lack_ratio = ["posix-mq", "zenoh", "iceoryx2"].iter().any(|other| row["vs"] == *other);
+    let may_lack_ratio = ["posix-mq", "zenoh", "iceoryx2", "C++"].iter().any(|other| row["vs"] == *other);
     if !may_lack_ratio && !is_skipped {
         assert_eq!(row["vs"].is_string(), number("ratio_p50").is_some(), "{row:?}");
     }

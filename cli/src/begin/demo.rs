@@ -4,6 +4,7 @@ mod account;
 mod arguments;
 mod asked;
 mod beyond;
+mod chaos;
 mod copy;
 mod folder;
 mod gui;
@@ -14,6 +15,7 @@ mod nodes;
 mod recording;
 mod replicas;
 mod takeover;
+mod team;
 
 use crate::launch::{TerminalView, end};
 use crate::look::summary::print_classes;
@@ -41,14 +43,23 @@ const SETTLE: Duration = Duration::from_secs(2);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let long = arguments.seconds.map(crate::terminal::units::seconds).transpose()?;
+    if let Some(count) = arguments.team {
+        return team::run(count, long);
+    }
     if let Some(count) = arguments.nodes.filter(|count| *count > 1) {
         if arguments.record.is_some() {
             return Err(ONE_NODE.into());
+        }
+        if let (Some(seed), Some(long)) = (arguments.chaos, long) {
+            return chaos::run(arguments, count, seed, long);
         }
         return nodes::run(arguments, count, long);
     }
     if arguments.gui == GuiConnection::Tcp {
         return Err("with one node there is no other way to join the GUI; use --nodes 3".into());
+    }
+    if arguments.chaos.is_some() {
+        return Err("a robot on one node has no computer that may die; use --nodes 3".into());
     }
     if arguments.kill_master {
         return Err("one node alone has no master to kill; use --nodes 3".into());

@@ -90,7 +90,7 @@ fn completed(command: &str, arg: Arg) -> Arg {
         (_, "level") => from(arg, levels),
         (_, "parameter") => from(arg, parameters),
         ("call", "arguments") => from(arg, call_arguments),
-        ("check" | "launch" | "load", "file") | (_, "config") => {
+        ("check" | "launch" | "load" | "make", "file") | (_, "config") => {
             let toml =
                 PathCompleter::any().filter(|path| path.is_dir() || path.extension().is_some_and(|end| end == "toml"));
             arg.add(ArgValueCompleter::new(toml))

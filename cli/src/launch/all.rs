@@ -16,11 +16,12 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::{Pid, getppid};
 use rohrpost_config::{Installation, Reach};
 use rohrpost_launch::{Event, events, reap_orphans};
+use rohrpost_mailbox::node_directory;
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::{Child, Command, ExitCode, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -57,9 +58,8 @@ pub(super) fn stop_with_it() -> Result<(), Failure> {
     }
 }
 
-/// The nodes of an installation, all on this computer.
+/// The nodes of an installation, or of several, all on this computer.
 pub(crate) struct LaunchedNodes<'a> {
-    installation: Arc<Installation>,
     nodes: Vec<Node>,
     happenings: Receiver<NodeEvent>,
     /// Open output streams of all nodes.
@@ -70,9 +70,21 @@ pub(crate) struct LaunchedNodes<'a> {
     /// The nodes are being stopped: their ends are expected.
     stopping: bool,
     lab: Lab,
+    /// How each launch is started.
+    start_with: StartWith,
+}
+
+struct StartWith {
+    executable: PathBuf,
+    /// How the network is made worse.
+    bad: Option<impair::ImpairmentSettings>,
+    /// Level from which on launch shows what modules say.
+    log: Option<String>,
+    sender: SyncSender<NodeEvent>,
 }
 
 struct Node {
+    installation: Arc<Installation>,
     name: String,
     child: Child,
     /// All its modules are on.
@@ -122,13 +134,14 @@ pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
 }
 
 impl<'a> LaunchedNodes<'a> {
-    /// Starts the launch of each node; each shows what its modules say from the level `log` on. The calling thread must
-    /// live as long as the nodes: the kernel takes its end for this command's end.
+    /// Starts the launch of each node of these installations, no two of one name; each shows what its modules say from
+    /// the level `log` on. The calling thread must live as long as the nodes: the kernel takes its end for this
+    /// command's end.
     ///
     /// # Errors
     /// When one cannot be started; then all are stopped.
     pub(crate) fn begin(
-        installation: Arc<Installation>,
+        installations: impl IntoIterator<Item = Arc<Installation>>,
         lab: Lab,
         bad: Option<impair::ImpairmentSettings>,
         log: Option<&str>,
@@ -136,30 +149,28 @@ impl<'a> LaunchedNodes<'a> {
     ) -> Result<Self, Failure> {
         let (sender, happenings) = sync_channel(LINES_MAX);
         listen(sender.clone())?;
-        let executable = std::env::current_exe()?;
-        let mut all =
-            Self { installation, nodes: Vec::new(), happenings, open: 0, speech, words: 0, stopping: false, lab };
-        for index in 0..all.installation.nodes.len() {
-            let started = all.start(index, &executable, (bad, log), &sender);
-            if let Err(error) = started {
-                all.stop();
-                return Err(error);
+        let start_with = StartWith { executable: std::env::current_exe()?, bad, log: log.map(str::to_owned), sender };
+        let (nodes, open, words, stopping) = (Vec::new(), 0, 0, false);
+        let mut all = Self { nodes, happenings, open, speech, words, stopping, lab, start_with };
+        for installation in installations {
+            for node in &installation.nodes {
+                let started = all.start(all.nodes.len(), installation.clone(), node.name.clone());
+                if let Err(error) = started {
+                    all.stop();
+                    return Err(error);
+                }
             }
         }
         Ok(all)
     }
 
-    fn start(
-        &mut self,
-        index: usize,
-        executable: &Path,
-        (bad, log): (Option<impair::ImpairmentSettings>, Option<&str>),
-        sender: &SyncSender<NodeEvent>,
-    ) -> Result<(), Failure> {
-        let name = self.installation.nodes[index].name.clone();
+    /// Starts the launch of a node, the next one or one that has ended.
+    fn start(&mut self, index: usize, installation: Arc<Installation>, name: String) -> Result<(), Failure> {
+        let StartWith { executable, bad, log, sender } = &self.start_with;
+        let sender = sender.clone();
         let mut command = Command::new(executable);
-        command.arg("launch").arg(&self.installation.path).args(["--node", &name, "--quiet"]);
-        command.args(log.map(|level| format!("--log={level}")));
+        command.arg("launch").arg(&installation.path).args(["--node", &name, "--quiet"]);
+        command.args(log.as_ref().map(|level| format!("--log={level}")));
         command.env(WITHIN, std::process::id().to_string());
         if let Some(bad) = bad {
             command.env(impair::ENVIRONMENT, bad.to_string());
@@ -168,12 +179,48 @@ impl<'a> LaunchedNodes<'a> {
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         let mut child = self.lab.command(&name, &mut command).map_err(|error: LabError| Failure::from(error))?;
         let (out, err) = (child.stdout.take(), child.stderr.take());
-        self.nodes.push(Node { name, child, runs: false, ended: None, told: 0 });
+        let node = Node { installation, name, child, runs: false, ended: None, told: 0 };
+        match self.nodes.get_mut(index) {
+            Some(before) => *before = node,
+            None => self.nodes.push(node),
+        }
         read(index, false, out, sender.clone())?;
         self.open += 1;
-        read(index, true, err, sender.clone())?;
+        read(index, true, err, sender)?;
         self.open += 1;
         Ok(())
+    }
+
+    /// Kills all processes of a node, as a cut of its power does.
+    ///
+    /// # Errors
+    /// When its launch cannot be waited for.
+    pub(crate) fn kill(&mut self, name: &str) -> Result<(), Failure> {
+        let Some(node) = self.nodes.iter_mut().find(|node| node.name == name) else { return Ok(()) };
+        node.child.kill()?;
+        // Those that end by themselves meanwhile are gone, too.
+        if let Ok(memory) = rohrpost_mailbox::Node::open(&node_directory(&node.installation.name, name)) {
+            let of = |participant| memory.process_of(&participant).ok().flatten();
+            for process in memory.participants().into_iter().filter_map(of) {
+                let _ = process.kill();
+            }
+        }
+        node.ended = Some(node.child.wait()?);
+        Ok(())
+    }
+
+    /// Starts a node again that was killed.
+    ///
+    /// # Errors
+    /// When its launch cannot be started.
+    pub(crate) fn start_again(&mut self, name: &str) -> Result<(), Failure> {
+        let Some(index) = self.nodes.iter().position(|node| node.name == name) else { return Ok(()) };
+        self.start(index, self.nodes[index].installation.clone(), name.into())
+    }
+
+    /// The network between the nodes.
+    pub(crate) fn lab(&self) -> &Lab {
+        &self.lab
     }
 
     /// Begins to capture the network's traffic.
@@ -211,7 +258,7 @@ impl<'a> LaunchedNodes<'a> {
     fn line(&mut self, index: usize, text: &str, complaint: bool) {
         let width = self.nodes.iter().map(|node| node.name.len()).max().unwrap_or(0);
         let node = &mut self.nodes[index];
-        node.runs |= text.starts_with(&runs(&node.name, &self.installation.name));
+        node.runs |= text.starts_with(&runs(&node.name, &node.installation.name));
         let line = format!("{:>width$} │ {text}", node.name);
         if complaint { self.speech.complain(&line) } else { self.speech.say(&line) }
     }

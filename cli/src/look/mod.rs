@@ -1,6 +1,7 @@
 //! How tools observe nodes and their modules: their own node in its shared memory, others through their launches. No
 //! call waits longer than [`PATIENCE`]; a node that does not answer is silent, and the tool reports that.
 
+pub(crate) mod control;
 pub(crate) mod observer;
 pub(crate) mod published;
 pub(crate) mod resolved;
@@ -22,7 +23,7 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, ToolLink};
 use rohrpost_config::Installation;
 use rohrpost_launch::launcher::{SnapshotRequest, launcher_of};
-use rohrpost_launch::survey::{MailboxSnapshot, Scope, Snapshot, Standing, Survey, look_at_all};
+use rohrpost_launch::survey::{MailboxSnapshot, ModuleSurvey, Scope, Snapshot, Standing, Survey, look_at_all};
 use rohrpost_mailbox::{InspectError, Name};
 use std::collections::BTreeSet;
 
@@ -141,7 +142,9 @@ impl Running {
     /// The modules of all selected nodes, except optional ones; and those that cannot be asked, with the reason.
     pub(crate) fn modules_to_ask(&self) -> Result<Vec<(Name, Option<Silence>)>, Failure> {
         let (survey, silent) = self.survey(Scope::Modules)?;
-        let all = survey.modules.iter().filter(|module| !module.is_left_out(&self.installation));
+        let is_asked =
+            |module: &&ModuleSurvey| !module.is_left_out(&self.installation) && module.standing() != Standing::StandsBy;
+        let all = survey.modules.iter().filter(is_asked);
         let why = |node: &str| silent.iter().find(|silence| silence.node == node).cloned();
         Ok(all.map(|module| (module.name, why(&module.node))).collect())
     }

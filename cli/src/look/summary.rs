@@ -42,6 +42,8 @@ pub(crate) struct Account {
     attempts_max: Option<u32>,
     pub(crate) error: Option<String>,
     pub(crate) restarts: u32,
+    /// For how long the part of its own code that runs has not come back, seconds; none: none runs.
+    pub(crate) in_turn_s: Option<f64>,
 }
 
 impl Account {
@@ -57,6 +59,7 @@ impl Account {
             attempts_max: counts.map(|(_, most)| most),
             error: Some(module.last_error(installation)).filter(|error| !error.is_empty()),
             restarts: module.restarts(),
+            in_turn_s: module.in_turn.map(|turn| turn.as_secs_f64()),
         }
     }
 
@@ -64,7 +67,7 @@ impl Account {
     pub(crate) fn said(status: &Status, before: Option<Self>) -> Self {
         let before = before.unwrap_or_else(Self::unknown);
         let error = Some(status.error.clone()).filter(|error| !error.is_empty()).or(before.error);
-        Self { state: status.state.into(), attempt: None, attempts_max: None, error, restarts: before.restarts }
+        Self { state: status.state.into(), attempt: None, attempts_max: None, error, ..before }
     }
 
     /// A module that does not answer, for this reason.
@@ -74,7 +77,14 @@ impl Account {
     }
 
     const fn unknown() -> Self {
-        Self { state: Standing::Unreachable, attempt: None, attempts_max: None, error: None, restarts: 0 }
+        Self {
+            state: Standing::Unreachable,
+            attempt: None,
+            attempts_max: None,
+            error: None,
+            restarts: 0,
+            in_turn_s: None,
+        }
     }
 
     /// The last error, with at most this many characters.

@@ -2,10 +2,11 @@
 
 use crate::look::observer::Tool;
 use crate::terminal::Failure;
+use crate::terminal::units::seconds;
 use clap::Args;
 use rohrpost::output::plain;
 use rohrpost::{Fault, ToolLink};
-use rohrpost_config::Installation;
+use rohrpost_config::{HOLDERS_FILE, Installation};
 use rohrpost_launch::launcher::launcher_of;
 use rohrpost_launch::survey::{Scope, Standing, node_of};
 use rohrpost_launch::{CONFIG_FILE, choose_node};
@@ -28,6 +29,26 @@ pub(crate) struct Target {
     /// Use this node, and show it alone; default: the first of the configuration that runs here.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
+}
+
+/// How a tool asks modules for what they know: on which node, for how long, and how it prints that.
+#[derive(Args)]
+pub(crate) struct Inquiry {
+    #[command(flatten)]
+    pub(crate) target: Target,
+    /// Timeout for an answer, seconds.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    timeout: f64,
+    /// One JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl Inquiry {
+    /// Longest wait for an answer.
+    pub(crate) fn timeout(&self) -> Result<Duration, Failure> {
+        seconds(self.timeout)
+    }
 }
 
 /// A running node and its configuration.
@@ -67,6 +88,7 @@ impl Target {
             match Node::open(&node_directory(&installation.name, &config.name)) {
                 Ok(node) => {
                     let (node_name, only) = (config.name.clone(), named.map(|node| node.name.clone()));
+                    let installation = at_holders(installation, &node)?;
                     return Ok(Running { installation, node_name, node, only, observer: RefCell::default() });
                 }
                 Err(error @ NodeError::Missing(_)) => failed = failed.or(Some(error)),
@@ -75,6 +97,12 @@ impl Target {
         }
         Err(failed.map_or_else(|| "the configuration has no node".into(), Failure::from))
     }
+}
+
+/// With each module of several nodes at the node that holds its lease, as the launch of this one knows.
+fn at_holders(installation: Installation, node: &Node) -> Result<Installation, Failure> {
+    let known = node.read_file(HOLDERS_FILE)?.unwrap_or_default();
+    Ok(installation.at_holders(&String::from_utf8_lossy(&known)))
 }
 
 /// Configuration of the one installation that runs here, or of the one that has a node of this name.
@@ -122,8 +150,17 @@ impl Running {
     pub(crate) fn again(&self) -> Result<Self, Failure> {
         let node = Node::open(self.node.path())?;
         let (config, node_name) = noted_config(&node)?;
-        let (installation, only) = (Installation::load(&config)?, self.only.clone());
+        let (installation, only) = (at_holders(Installation::load(&config)?, &node)?, self.only.clone());
         Ok(Self { installation, node_name, node, only, observer: RefCell::default() })
+    }
+
+    /// With each module of several nodes at the selected one, if that is one of them: its launch is meant, whichever
+    /// node holds the lease.
+    pub(crate) fn at_selected(mut self) -> Self {
+        if let Some(only) = &self.only {
+            self.installation = self.installation.seen_from(only);
+        }
+        self
     }
 
     /// Takes part as a tool.
@@ -155,8 +192,11 @@ impl Running {
     /// Whether it is reached only through the TCP router: a module of another system, or a program of this system
     /// outside the configuration.
     pub(crate) fn is_beyond(&self, module: Name) -> bool {
-        if self.installation.tcp.is_none() || module.system() != self.installation.system.id {
-            return self.installation.tcp.is_some();
+        if module.system() != self.installation.system.id {
+            return self.installation.reaches_others();
+        }
+        if self.installation.tcp.is_none() {
+            return false;
         }
         !self.is_known(module) && !self.is_here(module)
     }
@@ -216,6 +256,7 @@ impl Running {
             | Standing::Error
             | Standing::Busy
             | Standing::Stopped
+            | Standing::StandsBy
             | Standing::Unreachable => None,
         }
     }

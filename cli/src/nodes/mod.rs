@@ -1,5 +1,6 @@
-//! Commands for several nodes: how they hear each other, their time, their keys.
+//! Commands for several nodes: how they hear each other, their time, their keys, the files that they run.
 
+pub(crate) mod bundle;
 pub(crate) mod keys;
 pub(crate) mod net;
 pub(crate) mod quantities;

@@ -44,7 +44,7 @@ pub(crate) enum Order {
 }
 
 pub(crate) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failure> {
-    let running = arguments.target.find()?;
+    let running = arguments.target.find()?.at_selected();
     let name = running.module(&arguments.name)?;
     let module = running.installation.module(name).ok_or_else(|| {
         format!("the configuration has no module `{}`; `rohrpost list` shows which there are", running.text(name))
@@ -109,6 +109,10 @@ impl ModuleOrder<'_> {
             let text = &self.text;
             match child.phase {
                 Phase::Running if child.lives == incarnation => return self.at_work(&child, before),
+                Phase::StandsBy => {
+                    let node = self.running.node_of(self.name);
+                    return Ok(format!("{text} stands by on node {node}, and begins when that holds its lease"));
+                }
                 Phase::Stopped => return Err(format!("another user has stopped {text} meanwhile").into()),
                 // It ran and ended, or could not even be started.
                 _ if child.lives > incarnation || child.lives == incarnation && child.phase == Phase::Waiting => {
@@ -155,6 +159,12 @@ impl ModuleOrder<'_> {
         .into()
     }
 
+    /// What a command needs to reach this launch, also when another node runs the module.
+    fn standby_node(&self) -> String {
+        let module = self.running.installation.module(self.name).filter(|module| module.has_standby());
+        module.map_or(String::new(), |module| format!(" --node {}", module.node))
+    }
+
     /// The module's process, as its node has it.
     fn process(&self) -> Result<Option<ParticipantInfo>, Failure> {
         let survey = self.running.look(self.running.node_of(self.name), Scope::Module(self.name.raw()))?;
@@ -174,7 +184,8 @@ impl ModuleOrder<'_> {
                 Phase::Stopping => self.pause(&child)?,
                 phase if phase.is_over() => {
                     let (text, how) = (&self.text, child.last_end.lines().next().unwrap_or("it never ran"));
-                    return Ok(format!("{text} is stopped ({how}); `rohrpost start {text}` starts it"));
+                    let node = self.standby_node();
+                    return Ok(format!("{text} is stopped ({how}); `rohrpost start {text}{node}` starts it"));
                 }
                 _ => return Err(format!("another user has started {} again meanwhile", self.text).into()),
             }

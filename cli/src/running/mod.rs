@@ -3,6 +3,7 @@
 pub(crate) mod call;
 pub(crate) mod control;
 pub(crate) mod echo;
+pub(crate) mod halt;
 pub(crate) mod list;
 pub(crate) mod log;
 pub(crate) mod param;

@@ -1,5 +1,6 @@
 //! The command's output at the terminal.
 
+pub(crate) mod habits;
 pub(crate) mod parser;
 pub(crate) mod speech;
 pub(crate) mod table;

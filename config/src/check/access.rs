@@ -10,7 +10,9 @@ use rohrpost_mailbox::Name;
 /// one: rules go by the commanded name, and by each of its names a process is switched off.
 pub(crate) fn validate(installation: &Installation, module: &Module, lines: &Lines, reader: &Reader<'_>) {
     let access = &installation.access;
-    for (to, line) in module.calls.iter().zip(&lines.calls) {
+    // Of another system that one's file decides.
+    let own = |(to, _): &(&Name, &usize)| to.system() == installation.system.id;
+    for (to, line) in module.calls.iter().zip(&lines.calls).filter(own) {
         if let Some(rule) = access.against(module.name, *to) {
             reader.report(*line, told(installation, module, *to, rule));
         }

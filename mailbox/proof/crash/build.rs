@@ -1,7 +1,6 @@
 //! Copies the mailbox's sources, plants the mistakes of the catalogue in the copy, and copies the scenes, for
 //! `tests/mistaken`.
 
-#[allow(dead_code, reason = "the tests read the rest")]
 #[path = "tests/mistaken/catalog.rs"]
 mod catalog;
 
@@ -14,7 +13,7 @@ fn main() {
         tests: "tests/crash",
         started: "victim.rs",
         catalog: "tests/mistaken/catalog.rs",
-        mistakes: MISTAKES.iter().map(|mistake| (mistake.name, mistake.edits)).collect(),
+        mistakes: MISTAKES,
         finish: finished,
     }
     .write();

@@ -122,11 +122,31 @@ pub(crate) fn obtain<S: Owned>(
     shape: S::Shape,
     _registry: &RegistryLock,
 ) -> Result<(S, Held), Refused<S>> {
+    let name = S::file_name(id);
     match take_over(node, id, &shape)? {
         Predecessor::Same(segment, lock) => Ok((segment, lock)),
-        Predecessor::Other(old) => make(node, id, shape, Some(&old)),
-        Predecessor::None => make(node, id, shape, None),
+        Predecessor::Other(old) => make(node, id, shape, Some(&old), &name),
+        Predecessor::None => make(node, id, shape, None, &name),
     }
+}
+
+/// Makes one that nobody finds until [`reveal`] gives it its name. What is there under that name stays.
+pub(crate) fn obtain_hidden<S: Owned>(
+    node: &Node,
+    id: S::Id,
+    shape: S::Shape,
+    _registry: &RegistryLock,
+) -> Result<(S, Held), Refused<S>> {
+    make(node, id, shape, None, &hidden_name::<S>(id))
+}
+
+/// Gives one that is hidden its name, in place of what has it.
+pub(crate) fn reveal<S: Owned>(node: &Node, id: S::Id, _registry: &RegistryLock) -> io::Result<()> {
+    node.directory().rename(&hidden_name::<S>(id), &S::file_name(id))
+}
+
+fn hidden_name<S: Owned>(id: S::Id) -> String {
+    format!("{}.hidden", S::file_name(id))
 }
 
 /// Looks at what is there, as its owner, and adopts it if it is the same.
@@ -157,7 +177,13 @@ fn take_over<S: Owned>(node: &Node, id: S::Id, shape: &S::Shape) -> Result<Prede
 
 /// Makes the file, whole, then gives it its name. The old one is given up only when the new one is whole: without
 /// memory for that, what the old one holds stays.
-fn make<S: Owned>(node: &Node, id: S::Id, shape: S::Shape, old: Option<&S>) -> Result<(S, Held), Refused<S>> {
+fn make<S: Owned>(
+    node: &Node,
+    id: S::Id,
+    shape: S::Shape,
+    old: Option<&S>,
+    name: &str,
+) -> Result<(S, Held), Refused<S>> {
     // One maker at a time (the registry's lock), so one temporary name will do.
     const UNFINISHED: &str = "unfinished";
     let directory = node.directory();
@@ -173,7 +199,7 @@ fn make<S: Owned>(node: &Node, id: S::Id, shape: S::Shape, old: Option<&S>) -> R
             segment.replace(old);
             step!("create: carried over");
         }
-        directory.rename(UNFINISHED, &S::file_name(id))?;
+        directory.rename(UNFINISHED, name)?;
         step!("create: named");
         Ok((segment, lock))
     };

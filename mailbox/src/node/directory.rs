@@ -197,6 +197,18 @@ impl Node {
         self.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1)
     }
 
+    /// The last number that was given out.
+    pub fn last_incarnation(&self) -> u32 {
+        self.page().incarnations.load(Ordering::Acquire)
+    }
+
+    /// From now on gives out only numbers after this one, of another node: a module that moves between them then has
+    /// later numbers than it had there. One that this node has passed already changes nothing.
+    pub fn pass_incarnation(&self, number: u32) {
+        let pass = |last: u32| (number.wrapping_sub(last).cast_signed() > 0).then_some(number);
+        let _ = self.page().incarnations.fetch_update(Ordering::AcqRel, Ordering::Acquire, pass);
+    }
+
     /// Tells all receivers that somebody died, so that they look for what was left. Sleeping needs no timeout because a
     /// process that sees another end (launch, above all) calls this.
     pub fn announce_death(&self) {

@@ -23,6 +23,8 @@ pub enum ModuleState {
     Error = 4,
     /// About to end.
     Stopping = 5,
+    /// Ready but for its mailboxes: another node runs it, and this one may be next.
+    StandsBy = 6,
 }
 
 impl ModuleState {
@@ -34,13 +36,15 @@ impl ModuleState {
             Self::On => "on",
             Self::Error => "error",
             Self::Stopping => "stopping",
+            Self::StandsBy => "stands by",
         }
     }
 
     /// From the state of a line, which may complain besides.
     fn from_code(code: u32) -> Option<Self> {
         let code = code & !COMPLAINS;
-        [Self::Starting, Self::Off, Self::On, Self::Error, Self::Stopping].into_iter().find(|s| *s as u32 == code)
+        let all = [Self::Starting, Self::Off, Self::On, Self::Error, Self::Stopping, Self::StandsBy];
+        all.into_iter().find(|s| *s as u32 == code)
     }
 }
 

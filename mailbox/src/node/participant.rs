@@ -27,6 +27,8 @@ pub struct Participant {
     sending: Mutex<Vec<Name>>,
     /// Whether it watches descriptors.
     watching: Mutex<bool>,
+    /// The mailboxes that it receives from and nobody finds, while it [hides](Self::hide_mailboxes) them.
+    hidden: Mutex<Option<Vec<Name>>>,
 }
 
 impl Participant {
@@ -71,8 +73,8 @@ impl Participant {
             entry.pid.store(std::process::id(), Ordering::Relaxed);
             entry.module.store(module.module().raw(), Ordering::Release);
             step!("join: joined");
-            let (sending, watching) = Default::default();
-            return Ok(Arc::new(Self { node: node.clone(), file, me, traffic, sending, watching }));
+            let (sending, watching, hidden) = Default::default();
+            return Ok(Arc::new(Self { node: node.clone(), file, me, traffic, sending, watching, hidden }));
         }
         Err(NodeError::Crowded(node.path().into()))
     }
@@ -154,6 +156,11 @@ impl Participant {
     /// Whether it watches descriptors; locked while that changes.
     pub(crate) fn watching(&self) -> MutexGuard<'_, bool> {
         self.watching.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The mailboxes that it hides; none: it hides none.
+    pub(crate) fn hidden(&self) -> MutexGuard<'_, Option<Vec<Name>>> {
+        self.hidden.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(crate) fn claimant(&self) -> Claimant {

@@ -98,13 +98,15 @@ impl Participant {
         let shape = shape.as_stored();
         let taken = RegistryLock::take(self.node().directory());
         let registry = taken.map_err(|error| CreateError::of_node(name, error))?;
-        let (segment, lock) =
-            owned::obtain::<Segment>(self.node(), name, shape, &registry).map_err(|why| match why {
-                Refused::Owned(there) => {
-                    CreateError::Owned(name, there.map_or(0, |there| there.page().owner.pid.load(Ordering::Relaxed)))
-                }
-                Refused::File(path, source) => CreateError::of(&path, name, &shape, source),
-            })?;
+        let mut hidden = self.hidden();
+        let obtain = if hidden.is_some() { owned::obtain_hidden::<Segment> } else { owned::obtain::<Segment> };
+        let (segment, lock) = obtain(self.node(), name, shape, &registry).map_err(|why| match why {
+            Refused::Owned(there) => {
+                CreateError::Owned(name, there.map_or(0, |there| there.page().owner.pid.load(Ordering::Relaxed)))
+            }
+            Refused::File(path, source) => CreateError::of(&path, name, &shape, source),
+        })?;
+        hidden.iter_mut().for_each(|hidden| hidden.push(name));
         // Also of one that is taken over: its maker may have died before it could.
         self.node().raise_registry_epoch();
         step!("create: owned");
@@ -113,6 +115,50 @@ impl Participant {
         // ORDERING: Release; a sender that sees `sleeping` set by this owner sees which bell to ring.
         owner.participant.store(u32::from(self.claimant().participant), Ordering::Release);
         Ok(Receiver::new(self.clone(), segment, lock))
+    }
+
+    /// From now on nobody finds the mailboxes that this participant makes: what is sent to their names goes where it
+    /// would go without them. For a module that stands by while another node runs it.
+    ///
+    /// ```
+    /// use rohrpost_mailbox::{Name, Node, Participant, Shape};
+    /// # let directory = tempfile::tempdir()?;
+    /// let node = Node::create(&directory.path().join("node"), 0o700)?;
+    /// let (pilot, sender) = (Name::new(1, 140, 0, 0), Participant::join(&node, Name::NONE)?);
+    /// let module = Participant::join(&node, pilot)?;
+    /// module.hide_mailboxes();
+    /// let receiver = module.receiver(pilot, Shape::default())?;
+    /// assert!(sender.sender(pilot).is_err());
+    /// module.reveal_mailboxes()?;
+    /// assert!(sender.sender(pilot).is_ok());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn hide_mailboxes(&self) {
+        self.hidden().get_or_insert_default();
+    }
+
+    /// Gives all mailboxes that it hides their names, in which they are found from now on; what nobody owned there is
+    /// given up.
+    ///
+    /// # Errors
+    /// When somebody receives there, or the node's directory cannot be changed. Some may be found then.
+    pub fn reveal_mailboxes(&self) -> Result<(), CreateError> {
+        let node = self.node();
+        let registry = RegistryLock::take(node.directory());
+        let registry = registry.map_err(|error| CreateError::of_node(self.module(), error))?;
+        for name in self.hidden().take().unwrap_or_default() {
+            let file = file_name(name);
+            let left = owned::remove_orphan::<Segment>(node, name, || unlink(node, name, &registry));
+            if !left.map_err(|error| CreateError::of_node(name, error))? && node.directory().open_to_read(&file).is_ok()
+            {
+                let owner = node.look_at(name).and_then(|there| there.owner).unwrap_or(0);
+                return Err(CreateError::Owned(name, owner));
+            }
+            let revealed = owned::reveal::<Segment>(node, name, &registry);
+            revealed.map_err(|error| CreateError::File(name, node.path().join(file), error))?;
+        }
+        node.raise_registry_epoch();
+        Ok(())
     }
 }
 

@@ -17,11 +17,15 @@ use std::io;
 
 /// Ranges that a node can have: all instances of every class of a system, alone.
 pub const ROUTES_MAX: usize = 65_536;
+/// All of them, in the order in which a name is looked for.
+const FILES: [&str; 3] = [FILE, TEAM, BEYOND];
 const HEAD_BYTES: usize = 24;
 const RANGE_BYTES: usize = 8;
 
 const FILE: &str = "routes";
-/// The same format, for names that `routes` does not contain.
+/// Format of `routes`, for names of other systems that it does not contain.
+const TEAM: &str = "routes.team";
+/// Format of `routes`, for names that neither contains.
 const BEYOND: &str = "routes.beyond";
 
 impl Node {
@@ -50,6 +54,18 @@ impl Node {
         self.write_routes(BEYOND, via, ranges)
     }
 
+    /// Says that packages for these names of other systems go to the mailbox `via`, if they have no mailbox here and
+    /// [`set_routes`](Self::set_routes) names no range for them. These go before routes beyond.
+    ///
+    /// # Errors
+    /// As there.
+    ///
+    /// # Panics
+    /// As there.
+    pub fn set_routes_of_team(&self, via: Name, ranges: &[(Name, Name)]) -> Result<(), NodeError> {
+        self.write_routes(TEAM, via, ranges)
+    }
+
     fn write_routes(&self, file: &str, via: Name, ranges: &[(Name, Name)]) -> Result<(), NodeError> {
         assert!(ranges.len() <= ROUTES_MAX && ranges.iter().all(|(first, last)| first <= last));
         assert!(ranges.windows(2).all(|pair| pair[0].1 < pair[1].0), "ranges are in order, and none overlaps another");
@@ -75,7 +91,7 @@ impl Node {
     /// # Errors
     /// When the file cannot be removed.
     pub fn forget_routes(&self) -> Result<(), NodeError> {
-        for file in [FILE, BEYOND] {
+        for file in FILES {
             match self.directory().remove(file) {
                 Ok(()) => self.raise_registry_epoch(),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
@@ -94,10 +110,12 @@ impl Node {
 
 /// The mailbox that packages for a name go to, or what is wrong with the file.
 pub(crate) fn find(node: &Directory, name: Name) -> Result<Option<Name>, String> {
-    match find_in(node, FILE, name)? {
-        None => find_in(node, BEYOND, name),
-        found => Ok(found),
+    for file in FILES {
+        if let Some(via) = find_in(node, file, name)? {
+            return Ok(Some(via));
+        }
     }
+    Ok(None)
 }
 
 fn find_in(node: &Directory, file_name: &str, name: Name) -> Result<Option<Name>, String> {
@@ -107,7 +125,11 @@ fn find_in(node: &Directory, file_name: &str, name: Name) -> Result<Option<Name>
         Err(error) => return Err(format!("its file `{file_name}`: {error}")),
     };
     // Another process wrote it.
-    let router = if file_name == BEYOND { "client of the TCP router" } else { "router" };
+    let router = match file_name {
+        BEYOND => "client of the TCP router",
+        TEAM => "router of the team",
+        _ => "router",
+    };
     look_up(&bytes, name).ok_or_else(|| {
         format!("its file `{file_name}` is damaged, or another version's; start the node's {router} again")
     })
@@ -177,11 +199,16 @@ mod tests {
     #[test]
     fn what_has_no_route_is_looked_for_beyond() {
         const BEYOND_VIA: Name = Name::new(1, 64, 0, 3);
+        const TEAM_VIA: Name = Name::new(1, 65, 0, 3);
         let (near, far) = (Name::new(1, 200, 0, 0), Name::new(2, 200, 0, 0));
         let (_folder, node) = routes(&[(near, near)]);
         let all = (Name::new(1, 1, 0, 0), Name::new(255, 255, 255, 255));
         node.set_routes_beyond(BEYOND_VIA, &[all]).unwrap();
         assert_eq!((node.route(near), node.route(far)), (Some(VIA), Some(BEYOND_VIA)));
+        node.set_routes_of_team(TEAM_VIA, &[(far, all.1)]).unwrap();
+        let absent = Name::new(1, 201, 0, 0);
+        let found = [near, far, absent].map(|name| node.route(name));
+        assert_eq!(found, [VIA, TEAM_VIA, BEYOND_VIA].map(Some));
         node.forget_routes().unwrap();
         assert_eq!((node.route(near), node.route(far)), (None, None));
     }

@@ -1,7 +1,7 @@
 //! What built-in modules would refuse of a configuration, told before anything runs. The crate `config` knows no
 //! modules, so it is here that both meet.
 
-use super::{Builtin, description, wormhole};
+use super::{Builtin, description, team, wormhole};
 use rohrpost_config::{
     Document, GUI, Installation, Module, Problem, Program, RECORDER, REPLAY, RecordedItems, Show, nearest, size_text,
 };
@@ -24,6 +24,7 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
         }
     }
     problems.extend(wormhole::problems(installation, &document));
+    problems.extend(team::problems(installation, &document));
     for show in &installation.gui.show {
         problems.extend(data_of(installation, show));
         problems.extend(far_stream_of(installation, show));
@@ -34,6 +35,11 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
         problems.extend(streams.chain(record.data.iter().filter_map(|items| item_of(installation, items, false))));
     }
     problems
+}
+
+/// What people should know of an installation that is right: what each wormhole counts on.
+pub fn notes(installation: &Installation) -> Vec<String> {
+    wormhole::notes(installation)
 }
 
 /// Everything that built-in modules would refuse of the values that were saved of their parameters, by line of that

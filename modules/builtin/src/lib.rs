@@ -6,24 +6,35 @@
 
 #![forbid(unsafe_code)]
 
+mod arena;
 mod carmen;
 mod check;
 pub mod format;
+mod map;
 mod mapper;
+mod mischief;
 mod output;
 mod pilot;
 mod settings;
 mod sim;
+mod team;
 mod wormhole;
 
-pub use check::{check, check_saved};
+pub use arena::{ArenaError, OpenArena};
+pub use check::{check, check_saved, notes};
+pub use rohrpost_robot::arena::Report;
+pub use rohrpost_robot::simulator::Touch;
+pub use wormhole::holder_text;
 
 use rohrpost_config::{
     Document, Module as Configured, Problem, RECORDER, REPLAY, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER,
+    TEAM_ROUTER,
 };
 use rohrpost_modules::Module;
 use rohrpost_modules::interface::{Interface, Interfaces};
-use rohrpost_modules::interfaces::{RecorderInterface, ReplayInterface, RouterInterface, TcpInterface};
+use rohrpost_modules::interfaces::{
+    RecorderInterface, ReplayInterface, RouterInterface, TcpInterface, TeamRouterInterface,
+};
 use rohrpost_modules::runtime::{Start, StartError, run_started};
 use rohrpost_modules::schema::Description;
 
@@ -44,10 +55,12 @@ impl Builtin {
 
     fn find(name: &str) -> Option<Self> {
         Some(match name {
-            "sim" => Self::of::<sim::Sim>(),
+            sim::NAME => Self::of::<sim::Sim>(),
             "carmen" => Self::of::<carmen::Carmen>(),
             "mapper" => Self::of::<mapper::MapModule>(),
+            "mischief" => Self::of::<mischief::MischiefModule>(),
             "pilot" => Self::of::<pilot::PilotModule>(),
+            "team" => Self::of::<team::TeamModule>(),
             "wormhole" => Self::of::<wormhole::WormholeModule>(),
             "output" => Self::of::<output::OutputModule>(),
             _ => return None,
@@ -65,8 +78,22 @@ pub fn run(name: &str, start: Start) -> Option<Result<(), StartError>> {
 
 /// The built-in module that is called so or offers the interface of a class; none if nothing is built in for it.
 pub fn of_class(class: &str) -> Option<&'static str> {
-    let all =
-        ["sim", "carmen", "mapper", "pilot", "wormhole", "output", RECORDER, REPLAY, ROUTER, TCP_CLIENT, TCP_ROUTER];
+    let all = [
+        sim::NAME,
+        "carmen",
+        "mapper",
+        "pilot",
+        "mischief",
+        "team",
+        "wormhole",
+        "output",
+        RECORDER,
+        REPLAY,
+        ROUTER,
+        TCP_CLIENT,
+        TCP_ROUTER,
+        TEAM_ROUTER,
+    ];
     all.into_iter().find(|builtin| *builtin == class || description(builtin, class).is_some())
 }
 
@@ -76,6 +103,7 @@ pub fn description(builtin: &str, class: &str) -> Option<Description> {
     let beyond_here = match builtin {
         ROUTER => Some(RouterInterface::description()),
         TCP_CLIENT | TCP_ROUTER => Some(TcpInterface::description()),
+        TEAM_ROUTER => Some(TeamRouterInterface::description()),
         RECORDER => Some(RecorderInterface::description()),
         REPLAY => Some(ReplayInterface::description()),
         _ => None,

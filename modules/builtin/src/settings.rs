@@ -15,7 +15,7 @@ pub(super) trait Settings: DeserializeOwned {
         Ok(())
     }
 
-    /// Those that may change while it runs.
+    /// Settings that may change while it runs.
     fn parameters(&self) -> Vec<&str> {
         Vec::new()
     }

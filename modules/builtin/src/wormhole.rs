@@ -6,19 +6,26 @@
 //! motor, nor launch, nor the program can delay a deadline.
 
 mod check;
+mod held;
+mod navigation;
+mod program;
 mod settings;
 mod state;
 
 use super::settings::Settings as _;
-pub(super) use check::problems;
-use rohrpost_launch::launcher::LauncherProxy;
+pub(super) use check::{notes, problems};
+pub use held::holder_text;
+use held::{Held, holder};
+use navigation::Navigation;
+use program::Program;
 use rohrpost_mailbox::Name;
-use rohrpost_modules::interface::Proxy;
 use rohrpost_modules::interfaces::{
-    ControlRefusal, ControlState, DriveError, LaserInterface, Motor, MotorInterface, MotorProxy, Supervisor,
-    SupervisorInterface,
+    ControlRefusal, ControlState, Destination, DriveError, HeldHalt, LaserInterface, Motor, MotorInterface, MotorProxy,
+    Supervisor, SupervisorInterface,
 };
-use rohrpost_modules::runtime::{Context, ModuleClock, Received, RunningCommand, StreamSubscription, WakeUp};
+use rohrpost_modules::runtime::{
+    CommandFacts, Context, ModuleClock, Moment, Received, RunningCommand, StreamSubscription, WakeUp,
+};
 use rohrpost_modules::types::LaserScan;
 use rohrpost_modules::{Module, ModuleError};
 use rohrpost_supervision::{
@@ -40,17 +47,20 @@ pub(super) struct WormholeModule {
     seen: Option<Seen>,
     scans: StreamSubscription<LaserScan>,
     motor: MotorProxy,
-    launch: Option<LauncherProxy>,
-    program: Name,
+    navigation: Navigation,
+    program: Program,
     /// The module that has taken over.
     person: Option<Name>,
     clock: ModuleClock,
     command: RunningCommand,
     wake_up: WakeUp,
     last_look_ns: Option<u64>,
+    /// A promise that came too soon after a look is looked at then.
+    next_look_ns: Option<u64>,
     /// Before that the robot stands, whatever was before the start: nothing moves it past the wormhole.
     has_driven: bool,
     time: Epochs,
+    held: Held,
     told: Told,
 }
 
@@ -74,7 +84,16 @@ impl Epochs {
 /// A scan that can be believed.
 struct Seen {
     taken_ns: u64,
+    taken: Moment,
     scan: LaserScan,
+    /// From where on something may come, by beam; empty: not known yet, or never.
+    moving_m: Vec<f32>,
+}
+
+impl Seen {
+    fn scan(&self) -> Scan<'_> {
+        Scan { moving_m: &self.moving_m, ..seen(self.taken_ns, &self.scan) }
+    }
 }
 
 impl Module for WormholeModule {
@@ -83,34 +102,39 @@ impl Module for WormholeModule {
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         settings.check()?;
-        let installation = context.installation();
-        let program = installation.classes.parse_module(&settings.program)?;
-        let launcher = installation.module(program).and_then(|module| installation.node(&module.node));
-        let launcher = launcher.map(|node| installation.launch_of(node));
-        let launch = launcher.map(|launcher| LauncherProxy::new(context.link(), launcher));
+        let program = Program::open(&settings.program, context)?;
         let scans = context.subscribe_stream(LaserInterface::SCAN, &settings.laser)?;
         // What waits longer than that is not run: the envelope counts on it.
         let motor = context.proxy::<MotorProxy>(&settings.motor)?.with_timeout(settings.lag());
+        let navigation = Navigation::open(&settings, context)?;
         let limits = settings.limits();
         context.use_computer_clock();
         context.set_period(Duration::from_millis(settings.look_ms.into()));
+        let mut wormhole = Wormhole::new(settings.times());
+        let (held, person) = Held::restore(context, settings.starts_held, &mut wormhole);
         Ok(Self {
-            wormhole: Wormhole::new(settings.times()),
+            wormhole,
             envelope: Envelope::new(limits, settings.mounting()),
             motion: limits.motion(),
             sight: Sight::new(settings.scan_age_max_ns()),
             seen: None,
             scans,
             motor,
-            launch,
+            navigation,
             program,
-            person: None,
+            person,
             clock: context.clock().clone(),
             command: context.running_command(),
             wake_up: context.wake_up(),
             last_look_ns: None,
+            next_look_ns: None,
             has_driven: false,
-            time: Epochs { settles_ns: settings.scan_age_max_ns(), epoch: context.now().epoch, since_ns: 0 },
+            time: Epochs {
+                settles_ns: settings.scan_age_max_ns(),
+                epoch: context.now().epoch,
+                since_ns: context.clock().monotonic_ns(),
+            },
+            held,
             told: Told::new(context.installation().classes.clone()),
             settings,
         })
@@ -126,11 +150,16 @@ impl Module for WormholeModule {
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let now_ns = self.clock.monotonic_ns();
+        if self.program.is_another(now_ns, context) {
+            let change = self.wormhole.forget_program(now_ns);
+            self.follow(change);
+            self.navigation.forget(&self.settings);
+        }
         let sees = self.sees(now_ns);
         let change = self.wormhole.set_sight(now_ns, sees);
         self.follow(change);
         self.look();
-        let state = self.told.state(&self.wormhole, sees);
+        let state = self.state_now(sees);
         if self.told.is_news(&state) {
             context.complain(state::complaint(&state));
             context.publish_now(SupervisorInterface::CONTROL, &state)?;
@@ -148,10 +177,10 @@ impl Module for WormholeModule {
         // Stream and wormhole are on one node, and read one clock: a stamp of the future is none.
         let Some(age_ns) = system.ns.checked_sub(data.head.stamp_ns) else { return Ok(()) };
         let taken_ns = now_ns.saturating_sub(age_ns);
-        let since_ns = self.seen.as_ref().map_or(taken_ns, |seen| seen.taken_ns);
+        let since_ns = self.sight.last_taken_ns().unwrap_or(taken_ns);
         let moved = self.has_driven && self.motion.from(since_ns) != Default::default();
         match self.sight.look(now_ns, &seen(taken_ns, &scan), moved) {
-            Ok(()) => self.seen = Some(Seen { taken_ns, scan }),
+            Ok(()) => self.seen = Some(Seen { taken_ns, taken: data.moment(), scan, moving_m: Vec::new() }),
             // The scan before is as true as it was, and grows old.
             Err(NoSight::Repeated | NoSight::Old) => {}
             Err(NoSight::Blind | NoSight::Frozen | NoSight::Malformed) => self.seen = None,
@@ -164,6 +193,10 @@ impl Module for WormholeModule {
     }
 }
 
+fn order_of(command: CommandFacts) -> Order {
+    Order { incarnation: command.incarnation, sequence: command.sequence }
+}
+
 fn seen(taken_ns: u64, scan: &LaserScan) -> Scan<'_> {
     Scan {
         taken_ns,
@@ -171,6 +204,7 @@ fn seen(taken_ns: u64, scan: &LaserScan) -> Scan<'_> {
         step_rad: scan.step_rad.into(),
         range_max_m: scan.range_max_m.into(),
         ranges_m: &scan.ranges_m,
+        moving_m: &[],
     }
 }
 
@@ -184,10 +218,15 @@ impl WormholeModule {
         let now_ns = self.clock.monotonic_ns();
         let late_ns = self.last_look_ns.map_or(0, |last_ns| now_ns.saturating_sub(last_ns));
         self.told.late_looks += u64::from(late_ns > self.settings.look_max_ns());
-        self.last_look_ns = Some(now_ns);
-        let command = match (self.wormhole.in_effect(), &self.seen) {
-            (Some(wanted), Some(Seen { taken_ns, scan })) if !self.sight.is_old(now_ns, *taken_ns) => {
-                let verdict = self.envelope.check(now_ns, wanted, &seen(*taken_ns, scan), &self.motion);
+        (self.last_look_ns, self.next_look_ns) = (Some(now_ns), None);
+        let own = self.navigation.command(now_ns, &self.wormhole);
+        self.told.drives_itself(own.is_some());
+        let command = match (self.wormhole.in_effect(now_ns).or(own), &mut self.seen) {
+            (Some(wanted), Some(seen)) if !self.sight.is_old(now_ns, seen.taken_ns) => {
+                if seen.moving_m.is_empty() {
+                    seen.moving_m = self.navigation.moving_m(seen.taken, &seen.scan(), self.settings.mounting());
+                }
+                let verdict = self.envelope.check(now_ns, wanted, &seen.scan(), &self.motion);
                 self.told.checked(verdict);
                 verdict.command()
             }
@@ -200,6 +239,7 @@ impl WormholeModule {
             self.has_driven |= command != Command::STOP;
         }
         self.told.motor(sent.err().map(|error| error.to_string()));
+        self.held.note(&self.wormhole, self.person);
         self.wake_up.at(self.wormhole.due_ns());
     }
 
@@ -210,22 +250,16 @@ impl WormholeModule {
             Some(Control::Off) => self.told.lost(),
             None => {}
         }
-        if change.restart.is_none() {
-            return;
-        }
+        let Some(run) = change.restart else { return };
         let cause = format!("kept no promise for {} ms", self.settings.wait_ms);
-        let program = self.settings.program.clone();
-        let asked = self.launch.as_ref().map(|launch| {
-            // Of one that began later than that, the silence was another one's.
-            launch.begin_end_failing(program, cause, self.settings.wait_ms).map(drop)
-        });
+        let asked = self.program.end_failing(&self.settings.program, cause, run);
         self.told.restarted(&self.settings.program, asked);
     }
 
     /// Takes the promise of the caller, and looks at once.
     fn take(&mut self, duration_ns: u64, speed_m_s: f64, turn_rate_rad_s: f64) -> Result<(), String> {
         let facts = self.command.get();
-        let driver = if facts.from == self.program { Driver::Program } else { Driver::Person };
+        let driver = if facts.from == self.program.name { Driver::Program } else { Driver::Person };
         if driver == Driver::Person && self.person != Some(facts.from) {
             let text = match self.person {
                 Some(person) => format!("{} has taken over", self.told.name(person)),
@@ -233,11 +267,10 @@ impl WormholeModule {
             };
             return Err(text);
         }
-        let promise = Promise {
-            order: Order { incarnation: facts.incarnation, sequence: facts.sequence },
-            duration_ns,
-            command: Command { speed_m_s, turn_rate_rad_s },
-        };
+        if driver == Driver::Program {
+            self.program.heard_ns = self.clock.monotonic_ns();
+        }
+        let promise = Promise { order: order_of(facts), duration_ns, command: Command { speed_m_s, turn_rate_rad_s } };
         let now_ns = self.clock.monotonic_ns();
         let (change, taken) = self.wormhole.promise(now_ns, facts.age_ns, driver, promise);
         self.follow(change);
@@ -247,8 +280,8 @@ impl WormholeModule {
         if is_lost || taken.is_ok() && now_ns >= next_look_ns {
             self.look();
         } else {
-            let later_ns = taken.is_ok().then_some(next_look_ns);
-            self.wake_up.at(later_ns.into_iter().chain(self.wormhole.due_ns()).min());
+            self.next_look_ns = self.next_look_ns.or(taken.is_ok().then_some(next_look_ns));
+            self.wake_up.at(self.next_look_ns.into_iter().chain(self.wormhole.due_ns()).min());
         }
         taken.map_err(|refusal| {
             self.told.refused(refusal);
@@ -256,13 +289,24 @@ impl WormholeModule {
         })
     }
 
+    fn state_now(&self, sees: bool) -> ControlState {
+        let driven_by = self.person.map_or_else(|| self.settings.program.clone(), |person| self.told.name(person));
+        self.told.state(&self.wormhole, driven_by, self.held.halts(&self.wormhole), sees)
+    }
+
     /// What only people may call.
     fn refuse_program(&self) -> Result<Name, ControlRefusal> {
         let from = self.command.get().from;
-        if from == self.program {
+        if from == self.program.name {
             return Err(ControlRefusal(format!("{} is what is supervised here", self.settings.program)));
         }
         Ok(from)
+    }
+
+    /// The halt of this number and holder.
+    fn halt_of(&mut self, number: u32, said: &str) -> HaltId {
+        let holder = holder(said, &self.told.name(self.command.get().from));
+        HaltId { by: self.held.number_of(&self.wormhole.halts, &holder), number }
     }
 
     fn drive_by(&mut self, person: Option<Name>) {
@@ -282,8 +326,13 @@ impl Motor for WormholeModule {
         self.take(self.settings.promise_ns(), speed_m_s, turn_rate_rad_s).map_err(DriveError::Hardware)
     }
 
-    /// A promise to stand.
+    /// A promise to stand, and to go nowhere after that: what programs do when they are switched off.
     fn halt(&mut self) -> Result<(), DriveError> {
+        let facts = self.command.get();
+        if facts.from == self.program.name {
+            // One that is older than the last destination is refused below, too.
+            let _ = self.navigation.set_destination(order_of(facts), None);
+        }
         self.drive(0.0, 0.0)
     }
 }
@@ -293,17 +342,21 @@ impl Supervisor for WormholeModule {
         self.take(u64::from(duration_ms) * 1_000_000, speed_m_s, turn_rate_rad_s).map_err(ControlRefusal)
     }
 
-    fn halt(&mut self, number: u32) -> Result<(), ControlRefusal> {
-        let by = self.command.get().from.raw();
-        let halted = self.wormhole.halts.halt(HaltId { by, number });
+    fn halt(&mut self, number: u32, holder: String) -> Result<(), ControlRefusal> {
+        let halted = self.halt_of(number, &holder);
+        let halted = self.wormhole.halts.halt(halted);
         self.look();
         halted.map_err(|error| ControlRefusal(error.to_string()))
     }
 
-    fn resume(&mut self) -> Vec<String> {
-        self.wormhole.halts.resume(self.command.get().from.raw());
+    fn resume(&mut self, number: u32, holder: String) -> Result<Vec<HeldHalt>, ControlRefusal> {
+        if !holder.is_empty() {
+            self.refuse_program()?;
+        }
+        let halted = self.halt_of(number, &holder);
+        self.wormhole.halts.resume(halted);
         self.look();
-        self.told.halted_by(&self.wormhole)
+        Ok(self.held.halts(&self.wormhole))
     }
 
     fn resume_all(&mut self) -> Result<(), ControlRefusal> {
@@ -329,11 +382,19 @@ impl Supervisor for WormholeModule {
         self.refuse_program()?;
         self.wormhole.reset(self.clock.monotonic_ns());
         self.sight.reset();
+        self.navigation.reset();
         Ok(())
     }
 
+    fn set_destination(&mut self, destination: Option<Destination>) -> Result<(), ControlRefusal> {
+        let facts = self.command.get();
+        if facts.from != self.program.name {
+            return Err(ControlRefusal(format!("only {} has a destination here", self.settings.program)));
+        }
+        self.navigation.set_destination(order_of(facts), destination).map_err(ControlRefusal)
+    }
+
     fn state(&mut self) -> ControlState {
-        let sees = self.sees(self.clock.monotonic_ns());
-        self.told.state(&self.wormhole, sees)
+        self.state_now(self.sees(self.clock.monotonic_ns()))
     }
 }

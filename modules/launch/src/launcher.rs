@@ -14,6 +14,16 @@ use rohrpost_modules::interface;
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+/// Questions about leases that a node asks another one, or the answers.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct LeaseMessage {
+    /// The last incarnation that the sending node gave out. The other one passes it, so that a module has rising
+    /// incarnations from node to node.
+    pub incarnation: u32,
+    /// Of modules, by their raw names: bytes of `rohrpost_supervision::lease`.
+    pub leases: Vec<(u32, Vec<u8>)>,
+}
+
 /// Where launch stands with a module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Phase {
@@ -35,6 +45,8 @@ pub enum Phase {
     Failed,
     /// Optional, and its program was not there when launch began; a start looks for the program again.
     LeftOut,
+    /// Another of its nodes runs it, or may; this one begins when it holds the lease.
+    StandsBy,
 }
 
 impl Phase {
@@ -50,6 +62,7 @@ impl Phase {
             Self::Ended => "ended",
             Self::Failed => "failed",
             Self::LeftOut => "left out",
+            Self::StandsBy => "stands by",
         }
     }
 
@@ -68,11 +81,11 @@ impl Phase {
 /// What launch knows of a module.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ChildState {
-    /// Its name, such as `pilot.0`.
+    /// The module's name, such as `pilot.0`.
     pub module: String,
     /// Where launch stands with it.
     pub phase: Phase,
-    /// Its process, while there is one.
+    /// The module's process, while there is one.
     pub pid: Option<u32>,
     /// Processes it has had, this one included.
     pub lives: u32,
@@ -110,16 +123,16 @@ pub enum ControlError {
          `rohrpost list` shows which there are"
     )]
     NoModule(String),
-    /// It is to be started, and runs.
+    /// The module is to be started, and runs.
     #[error("{0} runs already; `rohrpost restart {0}` would end it first")]
     Running(String),
-    /// It is to be stopped, and was.
+    /// The module is to be stopped, and was.
     #[error("{0} is stopped already; `rohrpost start {0}` starts it")]
     Stopped(String),
-    /// It is to be stopped, and has ended by itself.
+    /// The module is to be stopped, and has ended by itself.
     #[error("{0} has ended already, and is not started again by itself; `rohrpost start {0}` starts it")]
     Ended(String),
-    /// It is to be stopped, and was left out.
+    /// The module is to be stopped, and was left out.
     #[error("{0} is left out and never ran, since its program is missing; `rohrpost start {0}` looks for it again")]
     LeftOut(String),
     /// The module is to be started, and its program is missing. One that runs goes on.
@@ -127,7 +140,7 @@ pub enum ControlError {
     NoProgram {
         /// The module.
         module: String,
-        /// Its program, as the configuration names it.
+        /// The module's program, as the configuration names it.
         program: String,
         /// Where launch looked for it.
         place: String,
@@ -146,13 +159,13 @@ pub const LOOK_BYTES_MAX: usize = 1 << 20;
 /// How much of a node is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Scope {
-    /// Its modules, and the traffic by class.
+    /// The node's modules, and the traffic by class.
     Modules,
-    /// These, all mailboxes and all streams.
+    /// The node's modules, all mailboxes and all streams.
     Mailboxes,
-    /// Its streams alone.
+    /// The node's streams alone.
     Streams,
-    /// These and what everybody sends.
+    /// All of the node, and what everybody sends.
     All,
     /// What there is of one module (its raw name): its streams, its mailboxes and those that it sends to, what it sends
     /// and what is sent to it.
@@ -236,10 +249,15 @@ pub trait Launcher {
     fn new_epoch(&mut self) -> Result<u64, ControlError>;
 
     /// Ends a module that does not do its work, as its watchdog would: a failure that its restart policy counts. Only
-    /// if it is on, in a process that has run for so long at least, ms; whether it was. One that was stopped, switched
+    /// if it is on, in the process that called with this incarnation; whether it was. One that was stopped, switched
     /// off, or started again meanwhile is left alone.
     #[command(23)]
-    fn end_failing(&mut self, module: String, cause: String, ran_for_ms: u32) -> Result<bool, ControlError>;
+    fn end_failing(&mut self, module: String, cause: String, incarnation: u32) -> Result<bool, ControlError>;
+
+    /// Asks for leases of modules with several nodes, which this node grants. No answer: not a question, one that a
+    /// newer one has passed, or this node's router could not be told.
+    #[command(24, idempotent)]
+    fn lease(&mut self, asks: LeaseMessage) -> LeaseMessage;
 }
 
 /// The functions' numbers.
@@ -252,6 +270,7 @@ pub(crate) const LOOK_ON: u16 = 21;
 const NEW_EPOCH: u16 = 22;
 #[cfg(test)]
 const END_FAILING: u16 = 23;
+pub(crate) const LEASE: u16 = 24;
 
 /// The name under which the launch of a node takes commands, if the configuration has this node.
 ///
@@ -287,7 +306,13 @@ mod tests {
         assert_eq!(numbers[..4], controls);
         assert_eq!(
             numbers[4..],
-            [("look", LOOK), ("look_on", LOOK_ON), ("new_epoch", NEW_EPOCH), ("end_failing", END_FAILING)]
+            [
+                ("look", LOOK),
+                ("look_on", LOOK_ON),
+                ("new_epoch", NEW_EPOCH),
+                ("end_failing", END_FAILING),
+                ("lease", LEASE)
+            ]
         );
     }
 }

@@ -15,4 +15,7 @@ mod launch;
 pub mod launcher;
 pub mod survey;
 
-pub use launch::{CONFIG_FILE, Event, Launch, LaunchError, NotStarted, choose_node, events, reap_orphans};
+pub use launch::{
+    CONFIG_FILE, Event, Launch, LaunchError, LeaseError, NotStarted, Permit, choose_node, events, reap_orphans,
+    stop_flag,
+};

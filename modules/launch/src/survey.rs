@@ -30,6 +30,7 @@ use rohrpost_mailbox::{
     ClassTraffic, FlowInfo, InspectError, Latency, Loss, MailboxDetail, MailboxInfo, Name, Node, NodeError,
     ParticipantInfo, ProcessError, SlotInfo, local, monotonic_ns, saturating_sum,
 };
+use std::time::Duration;
 
 /// A node at one moment.
 ///
@@ -67,15 +68,15 @@ pub struct Survey {
 /// A module at one moment.
 #[derive(Clone, Debug, Default)]
 pub struct ModuleSurvey {
-    /// Its node.
+    /// The module's node.
     pub node: String,
     /// When it was looked at, ns of that node's monotonic clock; none when the node does not answer.
     pub at_ns: Option<u64>,
-    /// Its name, local id 0.
+    /// The module's name, local id 0.
     pub name: Name,
     /// Further names of its process.
     pub aliases: Vec<Name>,
-    /// Its process, as the node's table has it; none when it does not run.
+    /// The module's process, as the node's table has it; none when it does not run.
     pub process: Option<ParticipantInfo>,
     /// What that takes of its computer; none until [`Survey::ask_kernel`], and if it has ended since.
     pub usage: Option<Usage>,
@@ -83,6 +84,8 @@ pub struct ModuleSurvey {
     pub scheduling: Option<Scheduling>,
     /// Which part of its own code runs, if that has not come back for long.
     pub working: Option<Working>,
+    /// For how long the part of its own code that runs has not come back; none: none runs.
+    pub in_turn: Option<Duration>,
     /// What its launch knows of it; none if no launch says anything.
     pub child: Option<ChildState>,
     /// Why it is in error, if launch does not know it and it was asked itself.
@@ -122,10 +125,11 @@ impl Survey {
                 ..survey(name, aliases, &participants, &mailboxes, &flows)
             };
             module.working = Working::of(&module, node, installation, at_ns);
+            module.in_turn = module.process.as_ref().and_then(|process| process.in_hand).map(|turn| turn.lasts(at_ns));
             module
         };
         let mut modules: Vec<ModuleSurvey> =
-            installation.modules_on(node_name).map(|module| survey(module.name, module.aliases.clone())).collect();
+            installation.modules_for(node_name).map(|module| survey(module.name, module.aliases.clone())).collect();
         for participant in participants.iter().filter(|p| p.module != Name::NONE) {
             if modules.iter().all(|module| module.name != participant.module) {
                 modules.push(survey(participant.module, Vec::new()));
@@ -137,7 +141,7 @@ impl Survey {
         Ok(Self { node: node_name.into(), at_ns, modules, mailboxes, streams, classes, flows })
     }
 
-    /// The same, no more of it than is asked for.
+    /// A survey of no more than is asked for.
     ///
     /// # Errors
     /// When the node's directory cannot be read.
@@ -211,10 +215,11 @@ impl Survey {
         }
     }
 
-    /// The module of this name, or with this alias.
+    /// The module of this name, or with this alias: where it runs, if other nodes stand by.
     pub fn module(&self, name: Name) -> Option<&ModuleSurvey> {
         let name = name.module();
-        self.modules.iter().find(|module| module.name == name || module.aliases.contains(&name))
+        let its = || self.modules.iter().filter(|module| module.name == name || module.aliases.contains(&name));
+        its().find(|module| module.standing() != Standing::StandsBy).or_else(|| its().next())
     }
 
     /// Packages a second that a module received since `earlier`.
@@ -303,8 +308,8 @@ pub fn node_of(installation: &Installation, name: Name) -> Option<&str> {
     installation.node_of(name)
 }
 
-/// The same, but of packages in transit only those that were lost there: the others are received once more where they
-/// go.
+/// Traffic of all mailboxes, but of packages in transit only what was lost there: the others are received again where
+/// they go.
 fn sum_of_ends(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<ClassTraffic> {
     let routers = [ROUTER, TCP].map(|class| installation.classes.id(class));
     let mut mailboxes = mailboxes.to_vec();

@@ -2,7 +2,7 @@
 //! drive.
 //!
 //! ```text
-//! world ──▶ simulator ──scan──▶ pilot ──twist──▶ simulator
+//! world ──▶ simulator ──scan──▶ pilot ──twist──▶ simulator ──▶ arena, which tells touches
 //!               ├─odometry──▶ fusion ──pose──┐
 //! carmen ───────│────────scan─────────────▶ grid ──▶ tiles of a map
 //!               └─pose──▶ camera, depth ──▶ picture, points
@@ -12,14 +12,17 @@
 
 #![forbid(unsafe_code)]
 
+pub mod arena;
 pub mod camera;
 pub mod carmen;
 pub mod depth;
 pub mod grid;
+pub mod lookout;
 pub mod pilot;
 pub mod pinhole;
 pub mod playback;
 pub mod sight;
 pub mod simulator;
+pub mod surroundings;
 mod traverse;
 pub mod world;

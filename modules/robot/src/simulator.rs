@@ -4,12 +4,14 @@
 //! commands and stamps give the same bits. Odometry and scanner draw from streams of their own, so that looking does
 //! not change the way.
 
+use super::surroundings::{Disc, Surroundings};
 use super::world::World;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rohrpost_modules::fusion::wrap_rad;
 use rohrpost_modules::types::{LaserScan, Odometry, Pose, Twist};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use thiserror::Error;
 
@@ -106,6 +108,17 @@ pub struct NoMotion {
     pub turn_rate_rad_s: f64,
 }
 
+impl NoMotion {
+    /// Refuses what holds something that is not a number.
+    ///
+    /// # Errors
+    /// The twist is no motion.
+    pub fn check(Twist { speed_m_s, turn_rate_rad_s }: Twist) -> Result<(), Self> {
+        let is_motion = speed_m_s.is_finite() && turn_rate_rad_s.is_finite();
+        if is_motion { Ok(()) } else { Err(Self { speed_m_s, turn_rate_rad_s }) }
+    }
+}
+
 /// What a call of [`Simulator::step_to`] did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stepped {
@@ -113,6 +126,32 @@ pub struct Stepped {
     pub steps: u64,
     /// Steps left out, because the caller came too late.
     pub skipped: u64,
+}
+
+/// The robot drove against something. Leaning against it is one touch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Touch {
+    /// The time of the step, ns, as the caller counts it.
+    pub at_ns: u64,
+    /// The point of contact in the world, metres.
+    pub x_m: f64,
+    /// See `x_m`.
+    pub y_m: f64,
+    /// Speed of the robot, metres a second; below zero: backward.
+    pub speed_m_s: f64,
+    /// Whether the robot moved towards the point of contact. Then the touch counts against it.
+    pub is_towards: bool,
+}
+
+/// A robot as it is at one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Moment {
+    /// The time of the last step, ns.
+    pub at_ns: u64,
+    /// Where the robot really is.
+    pub pose: Pose,
+    /// What its wheels say.
+    pub odometry: Odometry,
 }
 
 /// A robot in its world.
@@ -130,7 +169,7 @@ pub struct Stepped {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Simulator {
-    world: World,
+    surroundings: Surroundings,
     settings: Settings,
     /// Stamp of the last step; none before the first call.
     now_ns: Option<u64>,
@@ -144,6 +183,7 @@ pub struct Simulator {
     scan_random: ChaCha8Rng,
     bumps: u64,
     in_contact: bool,
+    last_touch: Option<Touch>,
 }
 
 impl Simulator {
@@ -156,7 +196,7 @@ impl Simulator {
         let wheel_scale = [(); 2].map(|()| 1.0 + settings.wheel_scale_error * normal(&mut wheel_random));
         let pose = world.start();
         Self {
-            world,
+            surroundings: Surroundings { world, discs: Vec::new() },
             settings,
             now_ns: None,
             commanded: Twist::default(),
@@ -169,15 +209,14 @@ impl Simulator {
             scan_random,
             bumps: 0,
             in_contact: false,
+            last_touch: None,
         }
     }
 
     /// Steps to `now_ns`, then takes this as the motion to reach, within the limits.
     pub fn command(&mut self, twist: Twist, now_ns: u64) -> Result<Stepped, NoMotion> {
+        NoMotion::check(twist)?;
         let Twist { speed_m_s, turn_rate_rad_s } = twist;
-        if !(speed_m_s.is_finite() && turn_rate_rad_s.is_finite()) {
-            return Err(NoMotion { speed_m_s, turn_rate_rad_s });
-        }
         let stepped = self.step_to(now_ns);
         let (speed_max, turn_max) = (self.settings.speed_max_m_s, self.settings.turn_rate_max_rad_s);
         self.commanded = Twist {
@@ -224,9 +263,37 @@ impl Simulator {
         self.bumps
     }
 
+    /// The last time that it drove against something.
+    pub fn last_touch(&self) -> Option<Touch> {
+        self.last_touch
+    }
+
+    /// The robot as it is now.
+    pub fn moment(&self) -> Moment {
+        Moment { at_ns: self.now_ns.unwrap_or_default(), pose: self.pose, odometry: self.odometry() }
+    }
+
+    /// Puts the robot where another simulator has it: from now on this one looks around there.
+    pub fn place(&mut self, moment: Moment) {
+        let Moment { at_ns, pose, odometry } = moment;
+        (self.now_ns, self.pose) = (Some(at_ns), pose);
+        (self.odometry, self.twist) = (odometry.pose, odometry.twist);
+    }
+
+    /// Where its scanner is mounted.
+    pub fn mounting(&self) -> Pose {
+        self.settings.scanner.mounting
+    }
+
     /// The world it is in.
     pub fn world(&self) -> &World {
-        &self.world
+        &self.surroundings.world
+    }
+
+    /// What else is in the world from now on, to be touched and seen.
+    pub fn set_others(&mut self, others: impl IntoIterator<Item = Disc>) {
+        self.surroundings.discs.clear();
+        self.surroundings.discs.extend(others);
     }
 
     /// Sets the standard deviation of a reading, from the next scan on.
@@ -252,7 +319,7 @@ impl Simulator {
             // Drawn for every beam, so that what one beam sees does not shift the noise of the next.
             let noise_m = range_noise_m * normal(&mut self.scan_random);
             let range_m =
-                self.world.cast(eye.x_m, eye.y_m, direction_rad, range_max_m).map(|range_m| range_m + noise_m);
+                self.surroundings.cast(eye.x_m, eye.y_m, direction_rad, range_max_m).map(|range_m| range_m + noise_m);
             scan.ranges_m.push(range_m.map_or(range_max_m, |range_m| range_m.clamp(0.001, range_max_m)) as f32);
         }
         scan
@@ -265,22 +332,28 @@ impl Simulator {
         let turn_change = self.settings.turn_acceleration_max_rad_s2 * STEP_S;
         self.twist.speed_m_s = towards(self.twist.speed_m_s, target.speed_m_s, speed_change);
         self.twist.turn_rate_rad_s = towards(self.twist.turn_rate_rad_s, target.turn_rate_rad_s, turn_change);
-        self.roll();
+        self.roll(now_ns);
     }
 
     /// Moves with the present twist, or turns on the spot if something is in the way.
-    fn roll(&mut self) {
+    fn roll(&mut self, now_ns: u64) {
         let turn_rad = self.twist.turn_rate_rad_s * STEP_S;
         let next = advanced(self.pose, self.twist.speed_m_s * STEP_S, turn_rad);
-        if self.world.disc_collides(next.x_m, next.y_m, self.settings.radius_m) {
-            self.bumps += u64::from(!self.in_contact);
+        if let Some((x_m, y_m)) = self.surroundings.contact(next.x_m, next.y_m, self.settings.radius_m) {
+            if !self.in_contact {
+                self.bumps += 1;
+                let way = (next.x_m - self.pose.x_m, next.y_m - self.pose.y_m);
+                let is_towards = way.0 * (x_m - self.pose.x_m) + way.1 * (y_m - self.pose.y_m) > 0.0;
+                let speed_m_s = self.twist.speed_m_s;
+                self.last_touch = Some(Touch { at_ns: now_ns, x_m, y_m, speed_m_s, is_towards });
+            }
             self.in_contact = true;
             self.twist.speed_m_s = 0.0;
             self.pose.heading_rad = next.heading_rad;
         } else {
             // A robot that pushes creeps and stops in turn: only one that came away may bump again.
             let clear_m = self.settings.radius_m + CLEAR_OF_CONTACT_M;
-            self.in_contact &= self.world.disc_collides(next.x_m, next.y_m, clear_m);
+            self.in_contact &= self.surroundings.contact(next.x_m, next.y_m, clear_m).is_some();
             self.pose = next;
         }
         self.count_wheels(self.twist.speed_m_s * STEP_S, turn_rad);

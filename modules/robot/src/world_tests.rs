@@ -1,5 +1,6 @@
 use super::*;
 use proptest::prelude::*;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 const ROOM: &str = "rohrpost-map 1\n# a room\ncell_m 0.5\nmap\n######\n#    #\n# ^# #\n#    #\n######\n";
 
@@ -15,30 +16,13 @@ fn map_is_read_as_drawn() {
 }
 
 #[test]
-fn carriage_returns_do_no_harm() {
-    assert_eq!(World::parse(&ROOM.replace('\n', "\r\n")), World::parse(ROOM));
-}
-
-#[test]
-fn bad_maps_say_where() {
-    let header = |line, expected, found: &str| MapError::Header { line, expected, found: found.into() };
-    let cases: [(&str, MapError); 11] = [
-        ("", MapError::NotThisFormat("rohrpost-map 1")),
-        ("type octile\n", MapError::NotThisFormat("rohrpost-map 1")),
-        ("rohrpost-map 1\n", MapError::Ended { line: 1, missing: "the line `map`" }),
-        ("rohrpost-map 1\nmap\n#>#\n", MapError::Ended { line: 2, missing: "the line `cell_m` and metres" }),
-        ("rohrpost-map 1\ncell_m -1\nmap\n", header(2, "a positive number of metres", "-1")),
-        ("rohrpost-map 1\ncell_m nan\nmap\n", header(2, "a positive number of metres", "nan")),
-        ("rohrpost-map 1\nsize 3\n", header(2, "`cell_m` and metres, or `map`", "size 3")),
-        ("rohrpost-map 1\ncell_m 1\nmap\n", MapError::Ended { line: 3, missing: "all of its rows" }),
-        ("rohrpost-map 1\ncell_m 1\nmap\n###\n#>\n", MapError::RowLength { line: 5, found: 2, expected: 3 }),
-        ("rohrpost-map 1\ncell_m 1\nmap\n#x#\n", MapError::Square { line: 4, column: 2, found: 'x' }),
-        ("rohrpost-map 1\ncell_m 1\nmap\n#>#\n#<#\n", MapError::SecondStart { line: 5 }),
-    ];
-    for (text, error) in cases {
-        assert_eq!(World::parse(text), Err(error), "{text:?}");
-    }
-    assert_eq!(World::parse("rohrpost-map 1\ncell_m 1\nmap\n# #\n"), Err(MapError::NoStart));
+fn a_map_is_a_world_only_with_one_robot() {
+    let own = |rows: &str| World::parse(&format!("rohrpost-map 1\ncell_m 1\nmap\n{rows}\n"));
+    assert_eq!(own("# #"), Err(WorldError::NoStart));
+    assert_eq!(own("#>#\n#<#"), Err(WorldError::SecondStart { line: 5, column: 2 }));
+    assert_eq!(World::parse(OCTILE), Err(WorldError::NotThisFormat("rohrpost-map 1")));
+    let told = own("#x#").unwrap_err().to_string();
+    assert!(told.starts_with("line 4, column 2: `x` is no square; "), "{told}");
 }
 
 const OCTILE: &str = "type octile\nheight 3\nwidth 5\nmap\nTT@TT\nT..OT\nTTTTT\n";
@@ -50,18 +34,14 @@ fn octile_start_is_free() {
 }
 
 #[test]
-fn bad_octile_maps_say_where() {
-    for (text, error) in [
-        ("rohrpost-map 1\n", MapError::NotThisFormat("type octile")),
-        ("type octile\nheight x\n", MapError::Header { line: 2, expected: "height", found: "height x".into() }),
-        ("type octile\nheight 2\nwidth 2\nmap\nT.\n", MapError::Ended { line: 5, missing: "all of its rows" }),
-        ("type octile\nheight 1\nwidth 2\nmap\nT.\nTT\n", MapError::TooLarge { line: 6 }),
-        ("type octile\nheight 1\nwidth 2\nmap\nT.T\n", MapError::RowLength { line: 5, found: 3, expected: 2 }),
-        ("type octile\nheight 1\nwidth 2\nmap\nTT\n", MapError::NoStart),
-    ] {
-        assert_eq!(World::parse_octile(text, 1.0), Err(error), "{text:?}");
+fn an_octile_map_is_a_world_only_with_a_free_square_of_some_size() {
+    assert_eq!(World::parse_octile("type octile\nheight 1\nwidth 2\nmap\nTT\n", 1.0), Err(WorldError::NoStart));
+    assert_eq!(World::parse_octile(ROOM, 1.0), Err(WorldError::NotThisFormat("type octile")));
+    for cell_m in [0.0, -1.0, f64::INFINITY] {
+        assert_eq!(World::parse_octile(OCTILE, cell_m), Err(WorldError::CellSize(cell_m)));
     }
-    assert_eq!(World::parse_octile(OCTILE, 0.0), Err(MapError::CellSize(0.0)));
+    let told = World::parse_octile("type octile\nheight 2\nwidth 2\nmap\nT.\n", 1.0).unwrap_err().to_string();
+    assert!(told.starts_with("line 5, column 3: the map ends here; "), "{told}");
 }
 
 #[test]
@@ -99,6 +79,26 @@ fn disc_collides_with_sides_and_corners() {
         (0.2, 0.2, 0.01, true, "inside a wall"),
     ] {
         assert_eq!(world.disc_collides(x_m, y_m, radius_m), collides, "{why}");
+    }
+}
+
+#[test]
+fn a_disc_is_blocked_if_all_of_it_is_and_nothing_is_known_off_the_map() {
+    let world = World::parse("rohrpost-map 1\ncell_m 0.5\nmap\n####\n####\n##> \n").unwrap();
+    for (x_m, y_m, radius_m, is_blocked, why) in [
+        (1.0, 1.0, 0.4, true, "in four squares"),
+        (0.6, 0.5, 0.39, true, "beside the free one"),
+        (0.6, 0.5, 0.41, false, "into its side"),
+        (0.8, 0.7, 0.28, true, "off its corner by 0.283 m"),
+        (0.8, 0.7, 0.29, false, "into its corner"),
+        (1.0, 1.0, 0.6, false, "from above"),
+        (0.3, 1.0, 0.31, false, "off the map"),
+        (1.9, 1.4, 0.11, false, "off the map, in the east and the north"),
+        (f64::NAN, 1.0, 0.1, false, "nowhere"),
+        (1.0, f64::INFINITY, 0.1, false, "nowhere"),
+        (1.0, 1.0, f64::NAN, false, "no disc"),
+    ] {
+        assert_eq!(world.disc_is_blocked(x_m, y_m, radius_m), is_blocked, "{why}");
     }
 }
 

@@ -119,6 +119,11 @@ impl Deduplicator {
         Self { started_ns, callers: Vec::with_capacity(places.total()), places }
     }
 
+    /// The server has stood by for another one, which ran nothing after this time: what that may have run is refused.
+    pub fn takes_over(&mut self, now_ns: u64) {
+        self.started_ns = now_ns;
+    }
+
     /// Decides on a command. `now_ns` is the monotonic clock.
     pub fn validate(&mut self, request: &Request, now_ns: u64) -> Verdict<'_> {
         let known = self.callers.iter().position(|caller| caller.from == request.from);

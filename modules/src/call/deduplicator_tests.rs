@@ -40,6 +40,17 @@ fn serve(once: &mut Deduplicator, request: &Request, now_ns: u64) -> &'static st
 }
 
 #[test]
+fn what_another_server_may_have_run_before_this_one_took_over_is_interrupted() {
+    let mut once = Deduplicator::new(0, &[]);
+    once.takes_over(9_900 * MS);
+    let repeat = |sequence, idempotent| Request { repeat: true, age_ns: 500 * MS, idempotent, ..request(sequence) };
+    assert_eq!(serve(&mut once, &repeat(1, false), 10_000 * MS), "interrupted");
+    assert_eq!(serve(&mut once, &repeat(2, true), 10_000 * MS), "run", "it may be run twice");
+    assert_eq!(serve(&mut once, &request(3), 10_000 * MS), "run", "nobody has it tried before");
+    assert_eq!(serve(&mut once, &repeat(4, false), 90_000 * MS), "run", "the first try was lost on its way here");
+}
+
+#[test]
 fn what_was_run_is_not_run_again_whatever_its_order() {
     for first in [1, u32::MAX - 100] {
         let mut once = Deduplicator::new(0, &[]);

@@ -1,7 +1,10 @@
 //! The caller's side: one reply mailbox, the ways into other mailboxes, and the calls under way.
 
+mod takeover;
+
 use super::absent::Absent;
 use super::envelope::micros;
+use super::stand_by::StandBy;
 use super::tally::{CallOutcome, Tallies, Tally};
 use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope, VALIDITY_MAX};
 use rohrpost_mailbox::{
@@ -37,6 +40,8 @@ pub struct Link {
     /// Buffers of calls that are over, to be used again.
     spare: Vec<Vec<u8>>,
     next_sequence: u32,
+    /// The module stands by.
+    stand_by: Option<StandBy>,
 }
 
 /// A call under way.
@@ -91,6 +96,7 @@ impl Link {
             spare: Vec::new(),
             // Sequence numbers may begin anywhere; from 1 they are easier to read.
             next_sequence: 1,
+            stand_by: None,
         }
     }
 
@@ -190,6 +196,11 @@ impl Link {
         // The number may come from another process's description.
         if !(1..=Type::COMMAND_MAX).contains(&function) {
             return Err(CallError::BadArguments(format!("{function} is no function's number")));
+        }
+        let taken_over = self.take_over();
+        taken_over.map_err(|error| SendError::Bad(to, error.to_string()))?;
+        if self.stand_by.is_some() {
+            return Err(SendError::NoMailbox(to).into());
         }
         // Counted for each server: one that hangs must not keep us from calling others.
         let there = self.calls.iter().filter(|call| call.to == to).count();

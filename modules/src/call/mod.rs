@@ -11,6 +11,7 @@ mod error;
 mod link;
 mod noted;
 mod pending;
+mod stand_by;
 mod tally;
 
 pub use caller::Caller;
@@ -21,4 +22,5 @@ pub use error::{CallError, Fault};
 pub(crate) use link::is_to;
 pub use link::{CALLS_MAX, Link};
 pub use pending::Pending;
+pub(crate) use stand_by::StandBy;
 pub use tally::Tally;

@@ -40,6 +40,26 @@ pub struct CauseCount {
     pub count: u64,
 }
 
+/// A halt that holds the robot.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct HeldHalt {
+    /// A module, or a person as `NAME@COMPUTER`.
+    pub holder: String,
+    /// The holder's own number of it.
+    pub number: u32,
+}
+
+/// A place in the plane, in the frame of the robot's odometry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Destination {
+    /// Metres along x.
+    #[schema(unit = "m")]
+    pub x_m: f64,
+    /// Metres along y.
+    #[schema(unit = "m")]
+    pub y_m: f64,
+}
+
 /// How it stands with the motor.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ControlState {
@@ -47,10 +67,16 @@ pub struct ControlState {
     pub mode: ControlMode,
     /// The source of the promises that count.
     pub driver: ControlDriver,
+    /// The module that makes them.
+    pub driven_by: String,
     /// Whether the last scan can be believed.
     pub sees: bool,
-    /// Modules that hold the robot by `halt`.
-    pub halted_by: Vec<String>,
+    /// What holds the robot, until each is let go by `resume`.
+    pub halts: Vec<HeldHalt>,
+    /// Whether it is held without a name, too: until `resume_all`.
+    pub held_unnamed: bool,
+    /// Whether the wormhole itself drives, to the program's last destination.
+    pub drives_itself: bool,
     /// Deadlines missed since control was gained last.
     pub failures: u32,
     /// Restarts of the program that were asked for.
@@ -83,14 +109,15 @@ pub trait Supervisor {
     #[command(16)]
     fn promise(&mut self, duration_ms: u32, speed_m_s: f64, turn_rate_rad_s: f64) -> Result<(), ControlRefusal>;
 
-    /// Stops the robot until the caller's `resume`, or anybody's `resume_all`. `number` is the caller's own, one for
-    /// each halt.
+    /// Stops the robot until `resume` of the same number and holder, or anybody's `resume_all`. `holder`: a person, as
+    /// `NAME@COMPUTER`; empty: the calling module. `number` is the holder's own, one for each halt; a repetition is no
+    /// second halt.
     #[command(17)]
-    fn halt(&mut self, number: u32) -> Result<(), ControlRefusal>;
+    fn halt(&mut self, number: u32, holder: String) -> Result<(), ControlRefusal>;
 
-    /// Lets go the halts of the caller; those that still hold the robot.
+    /// Lets go one halt; those that still hold the robot.
     #[command(18)]
-    fn resume(&mut self) -> Vec<String>;
+    fn resume(&mut self, number: u32, holder: String) -> Result<Vec<HeldHalt>, ControlRefusal>;
 
     /// Lets go the halts of all.
     #[command(19)]
@@ -112,7 +139,12 @@ pub trait Supervisor {
     #[command(23, idempotent)]
     fn state(&mut self) -> ControlState;
 
-    /// How it stands, whenever mode, driver, sight or halts change.
+    /// Names the program's destination, which the wormhole drives to when the program has missed a deadline, if it is
+    /// configured so (`safety = "greedy"`); none: there it halts. Only the program may.
+    #[command(24)]
+    fn set_destination(&mut self, destination: Option<Destination>) -> Result<(), ControlRefusal>;
+
+    /// How it stands, whenever mode, driver, sight or halts change, or the wormhole begins or ends to drive itself.
     #[data(1)]
     fn control() -> ControlState;
 }

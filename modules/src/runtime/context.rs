@@ -2,6 +2,7 @@
 
 mod opened;
 mod publishing;
+mod sending;
 mod standing_in;
 mod streaming;
 mod subscribing;
@@ -27,7 +28,7 @@ use crate::journal::ModuleJournal;
 use crate::publish::Subscriptions;
 use opened::OpenedFile;
 use rohrpost_config::{Installation, Principal, TimeSource};
-use rohrpost_mailbox::{Name, OverflowPolicy, Publications, Receiver, Shape, SystemTime, Watches, local};
+use rohrpost_mailbox::{CreateError, Name, OverflowPolicy, Publications, Receiver, Shape, SystemTime, Watches, local};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -140,6 +141,14 @@ impl Context {
             complaint: String::new(),
             scratch: Vec::new(),
         }
+    }
+
+    /// Stands by, if another node runs the module.
+    pub(super) fn take_over(&mut self) -> Result<(), CreateError> {
+        let mut link = self.link.unseen().borrow_mut();
+        link.take_over()?;
+        self.followings.begin(link.incarnation());
+        Ok(())
     }
 
     /// Under its names the module serves these interfaces.
@@ -363,7 +372,7 @@ impl Context {
     /// A module, and whether it is beyond the LAN: that has a name of four parts, and stands in another configuration.
     fn parsed(&self, module: &str) -> Result<(Name, bool), ContextError> {
         let classes = &self.installation.classes;
-        let is_beyond = self.installation.tcp.is_some() && module.split('.').count() == 4;
+        let is_beyond = self.installation.reaches_others() && module.split('.').count() == 4;
         let name = if is_beyond { classes.parse_name(module)?.module() } else { classes.parse_module(module)? };
         Ok((name, is_beyond))
     }

@@ -4,6 +4,11 @@
 pub const CONFIG: &str = "ROHRPOST_CONFIG";
 /// The module's name.
 pub const MODULE: &str = "ROHRPOST_MODULE";
+/// The node that it runs on.
+pub const NODE: &str = "ROHRPOST_NODE";
+/// Set: the last two descriptors that launch hands on are an event and a timer. The module stands by until the event is
+/// there; when the timer fires, its time on this node is over.
+pub const LEASE: &str = "ROHRPOST_LEASE";
 /// Process id of launch.
 pub const LAUNCHER: &str = "ROHRPOST_LAUNCHER";
 /// Times that it was started again.

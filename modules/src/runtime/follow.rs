@@ -134,6 +134,11 @@ impl Followings {
         Self { list: Vec::new(), incarnation, installation }
     }
 
+    /// The link has this incarnation from now on; nothing was subscribed before.
+    pub(crate) fn begin(&mut self, incarnation: u32) {
+        self.incarnation = incarnation;
+    }
+
     /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id, if one is
     /// left. `latest`: there only the newest counts, and on the way as well. `wanted`: what is expected.
     pub(crate) fn follow(

@@ -46,6 +46,11 @@ impl CommandServer {
         Self { commands, deduplicator: Deduplicator::new(monotonic_ns(), named), reply: Vec::with_capacity(1024) }
     }
 
+    /// Another node's process has served these commands up to now, and does so no more.
+    pub(super) fn takes_over(&mut self) {
+        self.deduplicator.takes_over(monotonic_ns());
+    }
+
     /// Handles the next command; false when there is none.
     pub fn handle(&mut self, handler: &mut impl CommandHandler) -> bool {
         let Some(package) = self.commands.try_receive() else { return false };

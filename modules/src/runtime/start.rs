@@ -6,18 +6,18 @@ use super::endpoint::{Endpoint, Offered};
 use super::environment;
 use super::error::StartError;
 use super::incarnation::Incarnation;
+use super::own_end::{die_with_launch, end_with_lease, stop_on_signals};
 use super::parameters;
 use super::runner::Running;
 use super::stream::{self, ServedStreams};
-use crate::call::Link;
+use crate::call::{Link, StandBy};
 use crate::interface::{Served, StandIn};
 use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal};
 use crate::made::MadeModule;
 use crate::module::ModuleError;
 use crate::output;
 use nix::sys::prctl::set_pdeathsig;
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
+use nix::sys::signal::Signal;
 use rohrpost_config::{Installation, JOURNAL, MailboxSpec, Scheduling, Start as StartState};
 use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, StreamError, StreamId, SystemClock, Work,
@@ -31,9 +31,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-
-/// For a process that is ended by force to say so.
-const LAST_WORDS: Duration = Duration::from_millis(20);
 
 /// Descriptors that launch keeps across restarts of this module, in launch's order. Call this once. Empty if launch
 /// keeps none, or the module was started by hand.
@@ -114,6 +111,10 @@ impl Start {
         let config = config.ok_or_else(|| StartError::Usage("which configuration?".into()))?;
         let module = module.ok_or_else(|| StartError::Usage("which module of it?".into()))?;
         let installation = Installation::load(Path::new(&config))?;
+        let installation = match variable(environment::NODE) {
+            Some(node) => installation.seen_from(&node),
+            None => installation,
+        };
         // A name that is no text is none of the configuration.
         let name = installation.classes.parse_module(&module.to_string_lossy())?;
         Ok(Self { installation: Arc::new(installation), name, launcher, restarts, off })
@@ -136,6 +137,7 @@ impl Start {
         participant.set_state(ModuleState::Starting);
         participant.set_restarts(self.restarts);
         let stop = stop_on_signals(&participant, module.stop_within)?;
+        let stands_by = stands_by(&participant, installation.lease_times().off, &stop)?;
         let clock = SystemClock::open(&node);
         let journal = self.journal(&participant, &clock)?;
         if !journal.is_replayed() {
@@ -175,7 +177,9 @@ impl Start {
         }
         let data = receiver(self.name.with_local(local::DATA), &module.mailboxes.data)?;
         let replies = receiver(self.name.with_local(local::REPLIES), &module.mailboxes.replies)?;
-        let link = Link::new(&participant, self.name, replies);
+        let mut link = Link::new(&participant, self.name, replies);
+        let has_stood_by = stands_by.is_some();
+        stands_by.into_iter().for_each(|stand_by| link.stand_by(stand_by));
         let clock = ModuleClock::new(clock, journal.clone());
         let names = endpoints.iter().map(|endpoint: &Endpoint<M>| endpoint.name).collect();
         let mut context = Context::new(self.name, installation.clone(), link, names, clock, data.shape());
@@ -196,6 +200,11 @@ impl Start {
         participant.end_work();
         let mut made = made.map_err(|error| failed(&text, &error))?;
         parameters::check_start(&mut made, &installation, module, &text)?;
+        output::drain();
+        context.take_over().map_err(|error| StartError::Mailbox(error.to_string(), error))?;
+        if has_stood_by {
+            endpoints.iter_mut().for_each(|endpoint| endpoint.command_server.takes_over());
+        }
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
         let spin = module.spin;
@@ -228,6 +237,23 @@ impl Start {
         journal.begin(&Begin::new(&module, (&config, &installation.text), saved));
         Ok(journal)
     }
+}
+
+/// What it waits for before it has its mailboxes, if another node may run it, and this one does not.
+fn stands_by(
+    participant: &Arc<Participant>,
+    off: Duration,
+    stop: &Arc<AtomicBool>,
+) -> Result<Option<StandBy>, StartError> {
+    if std::env::var_os(environment::LEASE).is_none() {
+        return Ok(None);
+    }
+    let holds = end_with_lease(participant, off)?;
+    if holds.load(Ordering::Acquire) {
+        return Ok(None);
+    }
+    participant.hide_mailboxes();
+    Ok(Some(StandBy { holds, stop: stop.clone() }))
 }
 
 /// For what the module stands in: names of its own, each of the class that its description says.
@@ -269,59 +295,6 @@ pub(crate) fn shape(spec: &MailboxSpec) -> Shape {
         max_age: spec.max_age,
         claims: spec.claims,
     }
-}
-
-/// Ends this process when launch dies, whatever killed it: no orphan drives a robot.
-fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
-    let Some(launcher) = launcher else { return Ok(()) };
-    set_pdeathsig(Some(Signal::SIGTERM)).map_err(|error| StartError::System("prctl", error.into()))?;
-    // It may have died before the call above.
-    if nix::unistd::getppid().as_raw().unsigned_abs() == launcher {
-        return Ok(());
-    }
-    // A program that launch started runs this one, and the kernel tells of that program's end alone.
-    let found = sys::Ancestor::find(launcher).map_err(|error| StartError::System("pidfd_open", error))?;
-    let launch = found.ok_or(StartError::Orphan(launcher))?;
-    let watch = move || {
-        launch.wait_end();
-        // Of ourselves: it cannot fail.
-        let _ = kill(Pid::this(), Signal::SIGTERM);
-    };
-    let spawned = std::thread::Builder::new().name("launch".into()).spawn(watch);
-    spawned.map(drop).map_err(|error| StartError::System("a thread that watches launch", error))
-}
-
-/// Signals that ask a process to end: SIGTERM, SIGINT, and SIGHUP unless it was started to ignore that, as by `nohup`.
-pub fn stop_signals() -> impl Iterator<Item = i32> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    [SIGTERM, SIGINT, SIGHUP].into_iter().filter(|signal| *signal != SIGHUP || !sys::ignores(SIGHUP))
-}
-
-/// On a signal to stop: ask the loop to end; if it does not within the time, end the process. SIGHUP is how the kernel
-/// wakes a stopped module after its launch has died.
-fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
-    let mut signals = signal_hook::iterator::Signals::new(stop_signals())
-        .map_err(|error| StartError::System("signal handlers", error))?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let (flag, participant) = (stop.clone(), participant.clone());
-    let wait = move || {
-        if signals.forever().next().is_some() {
-            flag.store(true, Ordering::Release);
-            participant.ring();
-            std::thread::sleep(within);
-            // A module that hangs may hang while it prints; then nobody else can, and the end must not wait for that.
-            let say = move || output::print(&format_args!("does not stop within {within:?}; ended"));
-            let _ = std::thread::Builder::new().spawn(say);
-            std::thread::sleep(LAST_WORDS);
-            // At once: destructors and `atexit` of C would run beside the module, which still works.
-            signal_hook::low_level::exit(1);
-        }
-    };
-    std::thread::Builder::new()
-        .name("signals".into())
-        .spawn(wait)
-        .map_err(|error| StartError::System("a thread for signals", error))?;
-    Ok(stop)
 }
 
 /// Asks for the class's scheduling; a refusal is one warning.

@@ -17,7 +17,8 @@
 //!   scan would have seen it in its way before, or sees it with the next scan. At the start, people leave that ring
 //!   free.
 //! - A point from which the robot drives away never keeps it from going.
-//! - What moves may come nearer by `others_m_s`, from the scan until the robot stands.
+//! - What moves may come nearer by `others_m_s`, from the scan until the robot stands. A wall that a map knows stands
+//!   still, and so does all that it holds back ([`crate::Walls`]).
 
 use crate::limits::Limits;
 use crate::sector::{Direction, Sector};
@@ -91,6 +92,8 @@ impl Verdict {
 const CREEP_M_S: f64 = 0.005;
 /// Directions without a beam are looked at so close together.
 const UNSEEN_STEP_RAD: f64 = PI / 90.0;
+/// More than rounding takes from a reach, in metres and as a part of it.
+const ENOUGH: f64 = 1e-9;
 
 /// Checks commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,7 +146,8 @@ impl Envelope {
             if asked_m_s == 0.0 && way.is_none() {
                 continue;
             }
-            let room = self.room(scan, &way.sector(heading), way.others_m);
+            let enough_m = way.reach_for(&self.limits, asked_m_s) * (1.0 + ENOUGH) + ENOUGH;
+            let room = self.room(scan, &way.sector(heading), way.others_m, enough_m);
             match way.speed_within(&self.limits, room.reach_m) {
                 None => return Verdict::Refused(room.why),
                 Some(safe_m_s) if safe_m_s < asked_m_s => (speed_m_s, why) = (safe_m_s, room.why),
@@ -157,19 +161,31 @@ impl Envelope {
         if to == command { Verdict::Passed(to) } else { Verdict::Capped(Capped { to, why }) }
     }
 
-    /// The least reach that any point of the scan, or any direction without one, allows.
-    fn room(&self, scan: &Scan<'_>, sector: &Sector, others_m: f64) -> Room {
+    /// The least reach that any point of the scan, or any direction without one, allows; `enough_m` if they allow more.
+    fn room(&self, scan: &Scan<'_>, sector: &Sector, others_m: f64, enough_m: f64) -> Room {
         let Limits { radius_m, margin_m, .. } = self.limits;
         let ring_m = radius_m + margin_m;
-        let mut room = Room { reach_m: f64::INFINITY, why: Why::Seen };
+        let mut room = Room { reach_m: enough_m, why: Why::Seen };
         let turn = Direction::of(scan.step_rad);
         let mut beam = Direction::of(self.mounting.heading_rad + scan.start_rad);
-        for range_m in scan.ranges_m {
+        let at = |room: &mut Room, beam: Direction, range_m: f64, radius_m: f64| {
+            let (x_m, y_m) = (self.mounting.x_m + range_m * beam.x, self.mounting.y_m + range_m * beam.y);
+            // What is further away touches the disc at no smaller reach, in no direction.
+            let touched_m = room.reach_m + radius_m;
+            if x_m * x_m + y_m * y_m < touched_m * touched_m {
+                room.or(sector.contact_m(x_m, y_m, radius_m), Why::Seen);
+            }
+        };
+        for (number, range_m) in scan.ranges_m.iter().enumerate() {
             if Scan::is_reading(*range_m) {
                 // Nothing came back: what is further than that is not known.
                 let range_m = f64::from(*range_m).min(scan.range_max_m);
-                let (x_m, y_m) = (self.mounting.x_m + range_m * beam.x, self.mounting.y_m + range_m * beam.y);
-                room.or(sector.contact_m(x_m, y_m, ring_m + others_m), Why::Seen);
+                let moving_m = scan.moving_m.get(number).map_or(range_m, |moving_m| range_m.max((*moving_m).into()));
+                at(&mut room, beam, moving_m, ring_m + others_m);
+                // What stands still, nearer than what moves.
+                if moving_m > range_m {
+                    at(&mut room, beam, range_m, ring_m);
+                }
             } else {
                 room.or(self.unseen_m(beam, sector, others_m), Why::Unseen);
             }

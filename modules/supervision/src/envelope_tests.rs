@@ -1,5 +1,7 @@
 use super::*;
 use core::f64::consts::FRAC_PI_2;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::vec::Vec;
 
 extern crate std;
@@ -28,7 +30,7 @@ fn ranges(range_m: impl Fn(f64) -> f32) -> Vec<f32> {
 
 fn scan(ranges_m: &[f32]) -> Scan<'_> {
     let step_rad = PI / (BEAMS - 1) as f64;
-    Scan { taken_ns: 900 * MS, start_rad: -FRAC_PI_2, step_rad, range_max_m: 8.0, ranges_m }
+    Scan { taken_ns: 900 * MS, start_rad: -FRAC_PI_2, step_rad, range_max_m: 8.0, ranges_m, moving_m: &[] }
 }
 
 /// A robot that stood.
@@ -124,6 +126,22 @@ fn what_moves_is_kept_away_from_further() {
     assert!(walking.command().speed_m_s < 0.7, "{walking:?}");
 }
 
+/// Walls on both sides, known up to a thickness: what they hide may come through as soon as it has had the time.
+#[test]
+fn what_a_known_wall_hides_is_kept_away_from_as_what_is_seen_there() {
+    let walls = ranges(|degrees| (0.5 / degrees.to_radians().sin().abs().max(0.01)).min(8.0) as f32);
+    let mut motion = limits().motion();
+    motion.tell(0, Command::STOP);
+    let now_ns = 10_000 * MS;
+    let speed_m_s = |thick_m: f32| {
+        let moving_m: Vec<f32> = walls.iter().map(|range_m| range_m + thick_m).collect();
+        let scan = Scan { taken_ns: now_ns - 100 * MS, moving_m: &moving_m, ..scan(&walls) };
+        let envelope = Envelope::new(Limits { others_m_s: 0.5, ..limits() }, Mounting::default());
+        envelope.check(now_ns, Command { speed_m_s: 0.5, turn_rate_rad_s: 0.0 }, &scan, &motion).command().speed_m_s
+    };
+    assert_eq!([0.0, 0.1, 1.0].map(speed_m_s), [0.0, 0.0, 0.5]);
+}
+
 #[test]
 fn a_robot_of_which_nothing_is_known_may_be_as_fast_as_it_can() {
     let (limits, wall) = (limits(), ranges(|degrees| (0.9 / degrees.to_radians().cos().max(0.01)).min(8.0) as f32));
@@ -169,8 +187,47 @@ fn a_scanner_that_is_mounted_elsewhere_sees_the_same_wall() {
     let mut motion = limits().motion();
     motion.tell(0, Command::STOP);
     let now_ns = 10_000 * MS;
-    let scan = Scan { taken_ns: now_ns, start_rad: -PI, step_rad: PI / 180.0, range_max_m: 8.0, ranges_m: &mounted };
+    let scan = Scan {
+        taken_ns: now_ns,
+        start_rad: -PI,
+        step_rad: PI / 180.0,
+        range_max_m: 8.0,
+        ranges_m: &mounted,
+        moving_m: &[],
+    };
     let forward = Command { speed_m_s: 1.0, turn_rate_rad_s: 0.0 };
     let told = Envelope::new(limits(), mounting).check(now_ns, forward, &scan, &motion).command();
     assert!((told.speed_m_s - 0.6).abs() < 0.001, "{told:?}");
+}
+
+/// Points that are too far to matter are left out: the reach is that of all of them.
+#[test]
+fn the_reach_is_the_least_of_all_points_and_no_more_than_enough() {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let envelope = Envelope::new(limits(), Mounting { x_m: 0.1, y_m: -0.05, heading_rad: 0.3 });
+    let mut cut = 0;
+    for _ in 0..2_000 {
+        let nearest_m = random.random_range(0.1..3.0);
+        let ranges_m: Vec<f32> = (0..360).map(|_| random.random_range(nearest_m..4.0)).collect();
+        let moving_m: Vec<f32> = ranges_m.iter().map(|range_m| range_m + random.random_range(-1.0..1.0)).collect();
+        let step_rad = TAU / ranges_m.len() as f64;
+        let scan = Scan { step_rad, start_rad: 0.0, moving_m: &moving_m, ..scan(&ranges_m) };
+        let right_rad: f64 = random.random_range(-FRAC_PI_2..0.0);
+        let left_rad = random.random_range(0.0..FRAC_PI_2);
+        let sector = Sector { right: Direction::of(right_rad), left: Direction::of(left_rad), is_wide: false };
+        let (others_m, enough_m) = (random.random_range(0.0..0.5), random.random_range(0.0..3.0));
+        let point = |beam: usize, range_m: f64, radius_m: f64| {
+            let beam = Direction::of(0.3 + beam as f64 * step_rad);
+            sector.contact_m(0.1 + range_m * beam.x, -0.05 + range_m * beam.y, radius_m)
+        };
+        let reaches = ranges_m.iter().zip(&moving_m).enumerate().map(|(beam, (range_m, moving_m))| {
+            let moving_m = f64::from(range_m.max(*moving_m));
+            point(beam, f64::from(*range_m), 0.3).min(point(beam, moving_m, 0.3 + others_m))
+        });
+        let least_m = reaches.fold(f64::INFINITY, f64::min);
+        let room = envelope.room(&scan, &sector, others_m, enough_m);
+        assert!((room.reach_m - least_m.min(enough_m)).abs() < 1e-9, "{room:?}, {least_m} m, {enough_m} m");
+        cut += usize::from(least_m < enough_m);
+    }
+    assert!((200..1_800).contains(&cut), "{cut}");
 }

@@ -11,7 +11,11 @@
 //! - [`Envelope`] checks *values*: a command passes only if the robot can still stop inside what its scanner saw free.
 //!   What a lower speed makes safe is capped.
 //! - [`Sight`] says whether a scan may be believed: new, young and not frozen.
+//! - [`Walls`]: points of a scan that a map knows, and that do not come nearer as a person might.
+//! - [`Safety`] drives when the program has missed its deadline: straight to its last destination, for a while.
 //! - [`Halts`]: callers that have stopped the robot, until each of them lets it go.
+//!
+//! A module that may run on one of several computers runs on one at a time: [`lease`].
 //!
 //! Time is an argument: nanoseconds of a monotonic clock, any origin. Nothing here allocates, waits or reads a clock:
 //! the same code runs in the module `wormhole`, in simulations, and on a microcontroller.
@@ -26,11 +30,14 @@
 mod command;
 mod envelope;
 mod halts;
+pub mod lease;
 mod limits;
 mod motion;
 mod promise;
+mod safety;
 mod sector;
 mod sight;
+mod walls;
 mod way;
 mod window;
 mod wormhole;
@@ -41,5 +48,7 @@ pub use halts::{HaltId, Halts, TooManyHalts};
 pub use limits::Limits;
 pub use motion::{Bounds, Motion};
 pub use promise::{Order, Promise, Refusal};
+pub use safety::{Located, Place, Safety};
 pub use sight::{NoSight, Scan, Sight};
-pub use wormhole::{Change, Control, Driver, Mode, Settings, Wormhole};
+pub use walls::{MapPose, Walls};
+pub use wormhole::{Change, Control, Driver, Missed, Mode, Settings, Wormhole};

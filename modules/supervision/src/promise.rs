@@ -39,7 +39,7 @@ fn is_newer(number: u32, than: u32) -> bool {
 }
 
 /// Why a promise was not taken. Nothing else follows from it: the deadline of the one before stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, thiserror::Error)]
 pub enum Refusal {
     /// Speed or turn rate.
     #[error("speed and turn rate must be finite numbers")]

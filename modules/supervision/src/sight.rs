@@ -15,6 +15,9 @@ pub struct Scan<'a> {
     pub range_max_m: f64,
     /// Distances, metres. Below or equal to 0, or not a number: no reading.
     pub ranges_m: &'a [f32],
+    /// Distances from which on something that moves may come, by beam, metres; see [`crate::Walls`]. Of a beam without
+    /// one, or with a smaller one than its reading: from the reading on.
+    pub moving_m: &'a [f32],
 }
 
 /// Beams further apart than this leave room for what a robot must not touch, radians.
@@ -100,6 +103,11 @@ impl Sight {
         if is_frozen { Err(NoSight::Frozen) } else { Ok(()) }
     }
 
+    /// When the scan was taken with which the next one is compared, ns.
+    pub fn last_taken_ns(&self) -> Option<u64> {
+        self.last.as_ref().map(|last| last.taken_ns)
+    }
+
     /// A person has looked: the next scan is compared with none.
     pub fn reset(&mut self) {
         self.last = None;
@@ -128,7 +136,14 @@ mod tests {
     const MILLISECOND_NS: u64 = 1_000_000;
 
     fn scan(taken_ms: u64, ranges_m: &[f32]) -> Scan<'_> {
-        Scan { taken_ns: taken_ms * MILLISECOND_NS, start_rad: 0.0, step_rad: 0.1, range_max_m: 8.0, ranges_m }
+        Scan {
+            taken_ns: taken_ms * MILLISECOND_NS,
+            start_rad: 0.0,
+            step_rad: 0.1,
+            range_max_m: 8.0,
+            ranges_m,
+            moving_m: &[],
+        }
     }
 
     fn looked(sight: &mut Sight, now_ms: u64, scan: &Scan<'_>, moved: bool) -> Result<(), NoSight> {

@@ -81,6 +81,14 @@ impl Way {
         }
     }
 
+    /// The least reach that allows a speed this way: what [`Way::speed_within`] answers, the other way round.
+    pub(crate) fn reach_for(&self, limits: &Limits, speed_m_s: f64) -> f64 {
+        let (braking, fast) = (limits.braking_m_s2, self.slowing_m_s);
+        let slowing_s = (fast - speed_m_s).max(0.0) / braking;
+        let most = fast.max(speed_m_s);
+        self.before_m + most * most / (2.0 * braking) + speed_m_s * (self.held_s - slowing_s).max(0.0)
+    }
+
     /// The greatest speed this way with which the robot stands within a reach; none: it is to brake. When the motor
     /// obeys, the command is held for L and the robot brakes at b then; m is how fast it may still be:
     ///

@@ -8,15 +8,13 @@
 //!   └──────────────────────────────────────────────────────────────┘   failures in a window ──▶ Failed, until a reset
 //! ```
 //!
-//! In each mode but `Active`, and while anybody holds a halt, no command is in effect: the robot brakes.
-//!
-//! Decided where the seed is silent:
+//! In each mode but `Active`, and while anybody holds a halt, no command is in effect: the robot brakes. Decided where
+//! the seed is silent:
 //!
 //! - The wormhole starts disabled. The promise that ends `Test` is in effect.
-//! - A deadline that is missed in `Test` counts as a failure, and the wait begins anew. The wait applies to the start
-//!   of a restarted program, too.
+//! - A deadline that is missed in `Test` counts as a failure, and the wait begins anew.
+//! - A restart is asked for once for each silence, not for a person's. Whether the program begins is for launch to see.
 //! - A deadline may come nearer by a later promise: a program may bind itself more, never less than it said last.
-//! - A person's missed deadline stops the robot, and restarts nothing.
 
 use crate::window::{REMEMBERED, Window};
 use crate::{Command, Halts, Order, Promise, Refusal};
@@ -73,7 +71,7 @@ pub enum Driver {
 }
 
 /// What the driver is to be told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Control {
     /// The driver has control from now on.
     On,
@@ -91,11 +89,13 @@ pub struct Change {
     pub restart: Option<u32>,
 }
 
-/// The wait after control was lost.
+/// A program that has lost control by its own missed deadline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-struct Wait {
-    until_ns: u64,
-    has_promised: bool,
+pub struct Missed {
+    /// The run that missed it.
+    pub run: u32,
+    /// When control was lost, ns.
+    pub lost_ns: u64,
 }
 
 /// What is known of one driver.
@@ -115,12 +115,12 @@ struct Seat {
 /// let mut wormhole = Wormhole::new(Settings::default());
 /// wormhole.set_sight(0, true);
 /// assert!(wormhole.promise(100, 0, Driver::Program, promise(1)).1.is_ok());
-/// assert_eq!(wormhole.in_effect(), None); // tried first
+/// assert_eq!(wormhole.in_effect(150), None); // tried first
 /// let (change, _) = wormhole.promise(250, 0, Driver::Program, promise(2));
-/// assert_eq!((change.control, wormhole.in_effect()), (Some(Control::On), Some(forward)));
+/// assert_eq!((change.control, wormhole.in_effect(250)), (Some(Control::On), Some(forward)));
 /// assert_eq!(wormhole.due_ns(), Some(450));
-/// assert_eq!(wormhole.look(450).control, Some(Control::Off)); // no promise in time: it brakes
-/// assert_eq!(wormhole.in_effect(), None);
+/// assert_eq!(wormhole.in_effect(450), None); // no promise in time: it brakes
+/// assert_eq!(wormhole.look(450).control, Some(Control::Off));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wormhole {
@@ -130,12 +130,15 @@ pub struct Wormhole {
     program: Seat,
     person: Seat,
     sees: bool,
-    /// Of the last promise taken, in `Test` and `Active`.
+    /// Of the last promise taken, in `Test` and `Active`; so are the next two.
     deadline_ns: u64,
+    incarnation: u32,
     command: Command,
     failures: u32,
     window: Window,
-    wait: Option<Wait>,
+    /// In `Disabled`: until when the program is to promise again.
+    wait_until_ns: Option<u64>,
+    missed: Option<Missed>,
     /// Callers that have stopped the robot.
     pub halts: Halts,
 }
@@ -151,10 +154,12 @@ impl Wormhole {
             person: Seat::default(),
             sees: false,
             deadline_ns: 0,
+            incarnation: 0,
             command: Command::STOP,
             failures: 0,
             window: Window::default(),
-            wait: None,
+            wait_until_ns: None,
+            missed: None,
             halts: Halts::default(),
         }
     }
@@ -175,15 +180,25 @@ impl Wormhole {
     }
 
     /// The command that the motor may be given, within the envelope; none: the robot is to brake.
-    pub fn in_effect(&self) -> Option<Command> {
-        (self.mode == Mode::Active && !self.halts.is_held()).then_some(self.command)
+    ///
+    /// A caller that looks late, or asks between two looks, gets no command after its deadline.
+    pub fn in_effect(&self, now_ns: u64) -> Option<Command> {
+        let is_in_time = self.mode == Mode::Active && now_ns < self.deadline_ns;
+        (is_in_time && !self.halts.is_held()).then_some(self.command)
+    }
+
+    /// The program, if it lost control by a missed deadline while no halt was held, and nothing has come since: no
+    /// promise, no blindness, no other driver, no failure too many.
+    pub fn missed(&self) -> Option<Missed> {
+        self.missed
     }
 
     /// When to [`Wormhole::look`] again at the latest; none while nothing is waited for.
     pub fn due_ns(&self) -> Option<u64> {
-        let deadline_ns = matches!(self.mode, Mode::Test | Mode::Active).then_some(self.deadline_ns);
-        let wait_ns = self.wait.filter(|wait| !wait.has_promised).map(|wait| wait.until_ns);
-        deadline_ns.into_iter().chain(wait_ns).min()
+        match self.mode {
+            Mode::Test | Mode::Active => Some(self.deadline_ns),
+            Mode::Disabled | Mode::Failed => self.wait_until_ns,
+        }
     }
 
     /// Takes a promise that came at `now_ns`. `age_ns`: at least so much of its duration is over, by what is known of
@@ -199,7 +214,9 @@ impl Wormhole {
     ) -> (Change, Result<(), Refusal>) {
         let passed = self.look(now_ns);
         match self.admit(age_ns, driver, &promise) {
-            Ok(is_other_run) => {
+            Ok(()) => {
+                // Not of the numbers before: a run that was late once has used some up, and is still to be tried.
+                let is_other_run = promise.order.incarnation != self.incarnation;
                 let lost = if is_other_run { self.disable() } else { None };
                 let taken = self.take(now_ns, age_ns, &promise);
                 (Change { control: taken.or(lost).or(passed.control), ..passed }, Ok(()))
@@ -208,14 +225,13 @@ impl Wormhole {
         }
     }
 
-    /// Whether the promise is of another run than the last one; numbers are used up even if it is late or blind.
-    fn admit(&mut self, age_ns: u64, driver: Driver, promise: &Promise) -> Result<bool, Refusal> {
+    /// Whether the promise may be taken; numbers are used up even if it is late or blind.
+    fn admit(&mut self, age_ns: u64, driver: Driver, promise: &Promise) -> Result<(), Refusal> {
         if !promise.command.is_finite() {
             return Err(Refusal::NotFinite);
         }
         let seat = if driver == Driver::Program { &mut self.program } else { &mut self.person };
-        let last = seat.last;
-        last.map_or(Ok(()), |last| promise.order.against(last))?;
+        seat.last.map_or(Ok(()), |last| promise.order.against(last))?;
         seat.last = Some(promise.order);
         if self.mode == Mode::Failed {
             return Err(Refusal::Failed);
@@ -229,26 +245,25 @@ impl Wormhole {
         if !self.sees {
             return Err(Refusal::Blind);
         }
-        Ok(last.is_some_and(|last| last.incarnation != promise.order.incarnation))
+        Ok(())
     }
 
     /// One step up, with a new deadline.
     fn take(&mut self, now_ns: u64, age_ns: u64, promise: &Promise) -> Option<Control> {
+        self.missed = None;
         self.command = promise.command;
+        self.incarnation = promise.order.incarnation;
         self.deadline_ns = now_ns.saturating_add(promise.duration_ns.min(self.settings.horizon_ns) - age_ns);
         match self.mode {
             Mode::Active | Mode::Failed => None,
             Mode::Disabled => {
                 self.mode = Mode::Test;
-                if let Some(wait) = &mut self.wait {
-                    wait.has_promised = true;
-                }
+                self.wait_until_ns = None;
                 None
             }
             Mode::Test => {
                 self.mode = Mode::Active;
                 self.failures = 0;
-                self.wait = None;
                 Some(Control::On)
             }
         }
@@ -260,10 +275,9 @@ impl Wormhole {
         if matches!(self.mode, Mode::Test | Mode::Active) && now_ns >= self.deadline_ns {
             change.control = self.fail(now_ns);
         }
-        let is_over = self.wait.is_some_and(|wait| now_ns >= wait.until_ns && !wait.has_promised);
-        let failed_often = self.wait.is_some() && self.failures > self.settings.failures_before_restart;
-        if is_over || failed_often {
-            self.wait = None;
+        let failed_often = self.failures > self.settings.failures_before_restart;
+        if self.wait_until_ns.is_some_and(|until_ns| now_ns >= until_ns || failed_often) {
+            self.wait_until_ns = None;
             change.restart = self.restart(now_ns);
         }
         change
@@ -273,12 +287,11 @@ impl Wormhole {
     fn fail(&mut self, now_ns: u64) -> Option<Control> {
         let lost = self.disable();
         if self.driver == Driver::Program {
+            let missed = Missed { run: self.incarnation, lost_ns: now_ns };
+            self.missed = (lost.is_some() && !self.halts.is_held()).then_some(missed);
             self.failures = self.failures.saturating_add(1);
             self.count(now_ns);
-            // A wait that runs is not made longer: each miss would put the restart off.
-            if self.wait.is_none_or(|wait| wait.has_promised) {
-                self.wait_anew(now_ns);
-            }
+            self.wait_anew(now_ns);
         }
         lost
     }
@@ -289,7 +302,6 @@ impl Wormhole {
         if self.mode == Mode::Failed {
             return None;
         }
-        self.mode = Mode::Disabled;
         self.failures = 0;
         self.program.last.map(|last| last.incarnation)
     }
@@ -299,14 +311,13 @@ impl Wormhole {
         self.window.push(now_ns);
         let most = (self.settings.failures_max as usize).min(REMEMBERED);
         if self.window.count(now_ns, self.settings.window_ns) >= most {
-            self.mode = Mode::Failed;
-            self.wait = None;
+            self.set_failed();
         }
     }
 
     fn wait_anew(&mut self, now_ns: u64) {
         let until_ns = now_ns.saturating_add(self.settings.wait_ns);
-        self.wait = (self.mode != Mode::Failed).then_some(Wait { until_ns, has_promised: false });
+        self.wait_until_ns = (self.mode != Mode::Failed).then_some(until_ns);
     }
 
     /// Takes control away, without blame.
@@ -345,6 +356,14 @@ impl Wormhole {
         Change { control: lost.or(passed.control), ..passed }
     }
 
+    /// Another computer runs the program now, with numbers of its own. The one before loses control, without blame.
+    pub fn forget_program(&mut self, now_ns: u64) -> Change {
+        let passed = self.look(now_ns);
+        let lost = if self.driver == Driver::Person { None } else { self.stand_by() };
+        self.program = Seat::default();
+        Change { control: lost.or(passed.control), ..passed }
+    }
+
     /// A program that has promised before is to promise again now.
     fn expect_program(&mut self, now_ns: u64) {
         let is_its_turn = self.driver == Driver::Program && self.sees && self.mode == Mode::Disabled;
@@ -355,8 +374,14 @@ impl Wormhole {
 
     /// Disabled, and nothing is waited for.
     fn stand_by(&mut self) -> Option<Control> {
-        self.wait = None;
+        (self.wait_until_ns, self.missed) = (None, None);
         self.disable()
+    }
+
+    /// Nobody has control until a person has looked. Also called when the run before this one has ended so.
+    pub fn set_failed(&mut self) {
+        self.mode = Mode::Failed;
+        (self.wait_until_ns, self.missed) = (None, None);
     }
 
     /// A person has looked: failures are forgotten, and the driver may try again.

@@ -40,6 +40,10 @@ impl Rig {
         self.now_ns = until_ns;
     }
 
+    fn in_effect(&self) -> Option<Command> {
+        self.wormhole.in_effect(self.now_ns)
+    }
+
     fn promise_with(&mut self, order: Order, duration_ms: u64, age_ms: u64, command: Command) -> Result<(), Refusal> {
         let promise = Promise { order, duration_ns: duration_ms * MS, command };
         let (change, taken) = self.wormhole.promise(self.now_ns, age_ms * MS, Driver::Program, promise);
@@ -60,10 +64,10 @@ impl Rig {
     /// Control, gained by two promises.
     fn active(settings: Settings) -> Self {
         let mut rig = Self::new(settings);
-        assert_eq!((rig.promise(), rig.wormhole.mode(), rig.wormhole.in_effect()), (Ok(()), Mode::Test, None));
+        assert_eq!((rig.promise(), rig.wormhole.mode(), rig.in_effect()), (Ok(()), Mode::Test, None));
         rig.pass(100);
         assert_eq!((rig.promise(), rig.wormhole.mode()), (Ok(()), Mode::Active));
-        assert_eq!(rig.wormhole.in_effect(), Some(FORWARD), "the promise that ends the test is in effect");
+        assert_eq!(rig.in_effect(), Some(FORWARD), "the promise that ends the test is in effect");
         rig
     }
 }
@@ -73,12 +77,12 @@ impl Rig {
 fn control_goes_at_the_missed_deadline_and_comes_back_with_the_second_promise() {
     let mut rig = Rig::active(Settings::default());
     rig.pass(199);
-    assert_eq!(rig.wormhole.in_effect(), Some(FORWARD));
+    assert_eq!(rig.in_effect(), Some(FORWARD));
     rig.pass(1);
-    assert_eq!((rig.wormhole.in_effect(), rig.wormhole.mode(), rig.wormhole.failures()), (None, Mode::Disabled, 1));
-    assert_eq!((rig.promise(), rig.wormhole.in_effect()), (Ok(()), None));
+    assert_eq!((rig.in_effect(), rig.wormhole.mode(), rig.wormhole.failures()), (None, Mode::Disabled, 1));
+    assert_eq!((rig.promise(), rig.in_effect()), (Ok(()), None));
     rig.pass(150);
-    assert_eq!((rig.promise(), rig.wormhole.in_effect(), rig.wormhole.failures()), (Ok(()), Some(FORWARD), 0));
+    assert_eq!((rig.promise(), rig.in_effect(), rig.wormhole.failures()), (Ok(()), Some(FORWARD), 0));
     assert_eq!(rig.controls, [Control::On, Control::Off, Control::On]);
     rig.pass(10_000);
     assert_eq!(rig.restarts[0], 1);
@@ -172,9 +176,9 @@ fn a_promise_that_is_old_late_blind_or_no_number_changes_nothing() {
     ] {
         assert_eq!(rig.promise_with(order, 200, age_ms, command), Err(refusal));
     }
-    assert_eq!((rig.wormhole.due_ns(), rig.wormhole.in_effect()), (due_ns, Some(FORWARD)));
+    assert_eq!((rig.wormhole.due_ns(), rig.in_effect()), (due_ns, Some(FORWARD)));
     let change = rig.wormhole.set_sight(rig.now_ns, false);
-    assert_eq!((change.control, rig.wormhole.in_effect()), (Some(Control::Off), None));
+    assert_eq!((change.control, rig.in_effect()), (Some(Control::Off), None));
     rig.sequence = 3;
     assert_eq!(rig.promise(), Err(Refusal::Blind));
     assert_eq!((rig.wormhole.failures(), rig.wormhole.due_ns()), (0, None), "the program is not blamed");
@@ -189,6 +193,29 @@ fn of_two_runs_of_a_program_only_the_newer_has_control() {
     let old = Order { incarnation: 1, sequence: 99 };
     assert_eq!(rig.promise_with(old, 200, 0, FORWARD), Err(Refusal::OldIncarnation));
     assert_eq!((rig.promise(), rig.wormhole.mode(), rig.wormhole.failures()), (Ok(()), Mode::Active, 0));
+}
+
+/// The numbers of the late promise are used up; the run that made it has shown nothing yet.
+#[test]
+fn a_newer_run_that_was_late_at_first_does_not_inherit_control() {
+    let mut rig = Rig::active(Settings::default());
+    rig.incarnation = 2;
+    let order = rig.next();
+    assert_eq!(rig.promise_with(order, 200, 200, FORWARD), Err(Refusal::Late));
+    assert_eq!(rig.in_effect(), Some(FORWARD), "the run before keeps what it has promised");
+    assert_eq!((rig.promise(), rig.wormhole.mode(), rig.in_effect()), (Ok(()), Mode::Test, None));
+    assert_eq!(rig.controls, [Control::On, Control::Off]);
+}
+
+#[test]
+fn a_caller_that_looks_late_gets_no_command_after_its_deadline() {
+    let mut rig = Rig::active(Settings::default());
+    rig.wormhole.halts.halt(crate::HaltId { by: 7, number: 1 }).expect("there is room");
+    rig.now_ns += 200 * MS;
+    rig.wormhole.halts.resume(crate::HaltId { by: 7, number: 1 });
+    assert_eq!((rig.wormhole.mode(), rig.in_effect()), (Mode::Active, None));
+    rig.pass(0);
+    assert_eq!(rig.controls, [Control::On, Control::Off]);
 }
 
 #[test]
@@ -206,19 +233,19 @@ fn numbers_may_wrap() {
 fn while_a_person_drives_the_program_does_not_and_neither_is_blamed_for_the_change() {
     let mut rig = Rig::active(Settings::default());
     let change = rig.wormhole.set_driver(rig.now_ns, Driver::Person);
-    assert_eq!((change.control, rig.wormhole.in_effect()), (Some(Control::Off), None));
+    assert_eq!((change.control, rig.in_effect()), (Some(Control::Off), None));
     assert_eq!(rig.promise(), Err(Refusal::OtherDriver));
     for sequence in [1, 2] {
         let promise = Promise { order: Order { incarnation: 7, sequence }, duration_ns: 200 * MS, command: FORWARD };
         assert_eq!(rig.wormhole.promise(rig.now_ns, 0, Driver::Person, promise).1, Ok(()));
     }
-    assert_eq!(rig.wormhole.in_effect(), Some(FORWARD));
+    assert_eq!(rig.in_effect(), Some(FORWARD));
     let change = rig.wormhole.set_driver(rig.now_ns, Driver::Person);
-    assert_eq!((change.control, rig.wormhole.in_effect()), (Some(Control::Off), None), "another person");
+    assert_eq!((change.control, rig.in_effect()), (Some(Control::Off), None), "another person");
     let promise = Promise { order: Order { incarnation: 3, sequence: 1 }, duration_ns: 200 * MS, command: FORWARD };
     assert_eq!(rig.wormhole.promise(rig.now_ns, 0, Driver::Person, promise).1, Ok(()), "with numbers of its own");
     rig.pass(5_000);
-    assert_eq!(rig.wormhole.in_effect(), None, "a person that lets go stops the robot");
+    assert_eq!(rig.in_effect(), None, "a person that lets go stops the robot");
     assert!(rig.restarts.is_empty() && rig.wormhole.failures() == 0);
     assert_eq!(rig.wormhole.set_driver(rig.now_ns, Driver::Program).control, None);
     assert_eq!((rig.promise(), rig.promise(), rig.wormhole.mode()), (Ok(()), Ok(()), Mode::Active));
@@ -228,11 +255,28 @@ fn while_a_person_drives_the_program_does_not_and_neither_is_blamed_for_the_chan
 fn a_halt_stops_the_robot_in_every_mode_and_the_deadline_goes_on() {
     let mut rig = Rig::active(Settings::default());
     rig.wormhole.halts.halt(crate::HaltId { by: 7, number: 1 }).expect("there is room");
-    assert_eq!((rig.wormhole.in_effect(), rig.wormhole.mode()), (None, Mode::Active));
+    assert_eq!((rig.in_effect(), rig.wormhole.mode()), (None, Mode::Active));
     rig.pass(100);
-    assert_eq!((rig.promise(), rig.wormhole.in_effect()), (Ok(()), None));
-    rig.wormhole.halts.resume(7);
-    assert_eq!(rig.wormhole.in_effect(), Some(FORWARD));
+    assert_eq!((rig.promise(), rig.in_effect()), (Ok(()), None));
+    rig.wormhole.halts.resume(crate::HaltId { by: 7, number: 1 });
+    assert_eq!(rig.in_effect(), Some(FORWARD));
     rig.pass(200);
-    assert_eq!(rig.wormhole.in_effect(), None);
+    assert_eq!(rig.in_effect(), None);
+}
+
+/// Runs of another computer are numbered by that computer.
+#[test]
+fn a_program_that_moves_to_another_computer_is_tried_with_numbers_of_its_own() {
+    let mut rig = Rig::active(Settings::default());
+    rig.incarnation = 0;
+    let earlier = rig.next();
+    assert_eq!(rig.promise_with(earlier, 200, 0, FORWARD), Err(Refusal::OldIncarnation));
+    assert_eq!(rig.wormhole.forget_program(rig.now_ns).control, Some(Control::Off));
+    assert_eq!((rig.wormhole.mode(), rig.in_effect(), rig.wormhole.failures()), (Mode::Disabled, None, 0));
+    assert_eq!((rig.promise(), rig.in_effect()), (Ok(()), None), "it is tried first");
+    assert_eq!((rig.promise(), rig.in_effect()), (Ok(()), Some(FORWARD)));
+    // A person goes on driving meanwhile.
+    let _ = rig.wormhole.set_driver(rig.now_ns, Driver::Person);
+    assert_eq!(rig.wormhole.forget_program(rig.now_ns).control, None);
+    assert_eq!(rig.wormhole.driver(), Driver::Person);
 }

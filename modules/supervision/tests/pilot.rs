@@ -52,6 +52,7 @@ fn drive(seed: u64, is_supervised: bool) -> Drive {
                 step_rad: scan.step_rad.into(),
                 range_max_m: scan.range_max_m.into(),
                 ranges_m: &scan.ranges_m,
+                moving_m: &[],
             };
             let verdict = envelope.check(now_ns, wanted, &seen, &motion);
             drive.commands += 1;

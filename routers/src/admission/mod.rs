@@ -18,7 +18,7 @@ pub(crate) use packet::tests::v4;
 
 use crate::frame::NodeIndex;
 use crate::{counts, session};
-use rohrpost_config::{Access, AccessRule, Installation, ROUTER, TCP, TCP_SERVER};
+use rohrpost_config::{Access, AccessRule, Installation, ROUTER, TCP, TCP_SERVER, TEAM_ROUTER};
 use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
 use rohrpost_network::Tunnel;
 
@@ -38,6 +38,8 @@ pub struct Admission {
     pub router: Option<Class>,
     /// Class of the TCP router and its clients.
     pub tcp: Option<Class>,
+    /// Class of the routers of the team.
+    pub team: Option<Class>,
     /// The tunnel for ordinary traffic, and which of its addresses is ours.
     pub tunnel: Option<(Tunnel, NodeIndex)>,
 }
@@ -53,7 +55,7 @@ pub enum ArrivalPath {
         /// See above.
         is_its_name: bool,
     },
-    /// By the TCP router, which vouches for the sender. `is_our_name`: it is one that this node hosts itself.
+    /// By the TCP router or the team's, which vouch for the sender. `is_our_name`: this node hosts it itself.
     Beyond {
         /// See above.
         is_our_name: bool,
@@ -102,6 +104,7 @@ impl Admission {
             access: installation.access.clone(),
             router: installation.classes.id(ROUTER),
             tcp: installation.classes.id(TCP),
+            team: installation.classes.id(TEAM_ROUTER),
             tunnel: tunnel.zip(installation.lan_index(node)),
         }
     }
@@ -155,7 +158,7 @@ impl Admission {
     /// same mailboxes as those of any module.
     fn is_routers_own(&self, name: Name) -> bool {
         let class = Some(name.class());
-        name.local() >= local::TRANSIT && (class == self.router || class == self.tcp)
+        name.local() >= local::TRANSIT && (class == self.router || class == self.tcp || class == self.team)
     }
 
     /// From and to the mailboxes of routers nothing comes but IP packets by the LAN, from each node with its own
@@ -182,7 +185,7 @@ impl Admission {
         let Head { to, from, .. } = *head;
         let class = Some(to.class());
         let is_for_all = class == self.tcp && to.module() == Name::new(to.system(), to.class().0, TCP_SERVER, 0);
-        let is_router = class == self.router || class == self.tcp;
+        let is_router = class == self.router || class == self.tcp || class == self.team;
         matches!(way, ArrivalPath::Beyond { .. }) && from.system() != to.system() && is_router && !is_for_all
     }
 }

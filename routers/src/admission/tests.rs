@@ -4,6 +4,7 @@ use std::net::Ipv4Addr;
 
 const ROUTER: Class = Class(250);
 const TCP: Class = Class(64);
+const TEAM: Class = Class(65);
 const TUNNEL_NET: Tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
 
 /// Admission of node 0, with a tunnel, where only class 100 may command class 200, and only class 90 the module of
@@ -16,6 +17,7 @@ fn admission() -> Admission {
         access: Access::new(vec![of_module, of_class]),
         router: Some(ROUTER),
         tcp: Some(TCP),
+        team: Some(TEAM),
         tunnel: Some((TUNNEL_NET, 0)),
     }
 }
@@ -55,7 +57,7 @@ fn a_sender_under_a_name_of_another_is_refused() {
 #[test]
 fn the_mailboxes_of_routers_take_nothing_and_their_modules_are_as_any() {
     let tool = name(1, 32, 40, 1);
-    for class in [ROUTER.0, TCP.0] {
+    for class in [ROUTER.0, TCP.0, TEAM.0] {
         for local in 0..=u8::MAX {
             let expected = if local < local::TRANSIT { Ok(()) } else { Err(NotAdmitted::RoutersOwn) };
             for way in [lan(1), BEYOND] {

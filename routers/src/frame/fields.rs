@@ -31,7 +31,7 @@ pub(super) fn word<const N: usize>(bytes: &[u8; N], at: usize) -> u32 {
 }
 
 /// Eight bytes at an offset that the caller's array has.
-pub(super) fn long<const N: usize>(bytes: &[u8; N], at: usize) -> u64 {
+pub(crate) fn long<const N: usize>(bytes: &[u8; N], at: usize) -> u64 {
     let mut eight = [0; 8];
     eight.copy_from_slice(&bytes[at..at + 8]);
     u64::from_le_bytes(eight)

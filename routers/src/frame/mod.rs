@@ -20,7 +20,7 @@ mod refusal;
 mod replica;
 
 use crate::port::{Port, SEQUENCES};
-use fields::long;
+pub(crate) use fields::long;
 pub use fields::{BadFrame, VERSION};
 pub use part_request::{ASKED_PARTS_MAX, PART_REQUEST_BYTES_MAX, PartRequest, PartRequestBytes};
 pub use refusal::{Refusal, RefusalReason};
@@ -35,7 +35,8 @@ pub const PARTS_MAX: u16 = 256;
 const MAGIC: [u8; 2] = *b"Rp";
 /// A million datagrams a second reach it after nine years; so a sequence and a place in its datagram fit in 64 bits.
 pub const SEQUENCE_MAX: u64 = SEQUENCES - 1;
-const CHECK: std::ops::Range<usize> = 32..36;
+/// Offset of the check in a head.
+pub(crate) const CHECK: std::ops::Range<usize> = 32..36;
 
 /// A node by its place in the configuration, from 0.
 pub type NodeIndex = u8;
@@ -207,7 +208,8 @@ pub fn write_check(datagram: &mut [u8]) {
     }
 }
 
-fn check(head: &[u8; HEAD_BYTES], rest: &[&[u8]]) -> u32 {
+/// The check of a datagram.
+pub(crate) fn check(head: &[u8; HEAD_BYTES], rest: &[&[u8]]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(before_check(head));
     rest.iter().for_each(|part| hasher.update(part));

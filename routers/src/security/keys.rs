@@ -96,7 +96,7 @@ impl KeyRing {
     }
 
     /// Where the key stands that byte 7 names.
-    pub(super) fn place(&self, id: u8) -> Option<usize> {
+    pub(crate) fn place(&self, id: u8) -> Option<usize> {
         self.keys.iter().position(|key| key.id.0.get() == id)
     }
 
@@ -127,6 +127,8 @@ pub(super) enum Purpose {
     Rest = 4,
     /// What the two ends of a replica send to each other.
     Replicas = 5,
+    /// What an incarnation of a system's node sends to other systems.
+    Team = 6,
 }
 
 /// One end of a direction.

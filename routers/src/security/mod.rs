@@ -48,6 +48,7 @@ mod rejection;
 mod seal;
 mod sealing;
 mod tally;
+mod team_seal;
 mod unverified;
 
 pub use crate::port::Port;
@@ -62,6 +63,7 @@ pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;
 pub use sealing::{NoSession, Sealing};
 pub use tally::{Rejections, TELL_EVERY_NS, Tally};
+pub(crate) use team_seal::TeamSeal;
 
 /// Bytes of a datagram that carries a hello.
 pub const HELLO_DATAGRAM_BYTES: usize = crate::frame::HEAD_BYTES + HELLO_BYTES + TAG_BYTES;

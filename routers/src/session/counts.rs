@@ -123,19 +123,19 @@ impl SessionCounts {
         self.classes.iter().map(|class| class.lost(cause)).sum()
     }
 
-    pub(super) fn came(&self, priority: Priority) {
+    pub(crate) fn came(&self, priority: Priority) {
         self.class(priority).packages.add(1);
     }
 
-    pub(super) fn passed(&self, priority: Priority) {
+    pub(crate) fn passed(&self, priority: Priority) {
         self.class(priority).passed.add(1);
     }
 
-    pub(super) fn replaced(&self, priority: Priority) {
+    pub(crate) fn replaced(&self, priority: Priority) {
         self.class(priority).replaced.add(1);
     }
 
-    pub(super) fn lost(&self, priority: Priority, cause: Cause) {
+    pub(crate) fn lost(&self, priority: Priority, cause: Cause) {
         self.class(priority).lost[cause as usize].add(1);
     }
 }

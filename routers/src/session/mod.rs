@@ -76,7 +76,7 @@ pub trait EndHost {
 
 /// The answer to a command that goes no further, in the name of the module that it was for. None for what nobody waits
 /// for, and for what was handed out before: it may have been run.
-fn answer_to(
+pub(crate) fn answer_to(
     head: &Head,
     call: &[u8],
     why: Cause,

@@ -13,9 +13,8 @@
 //! With time slots, the thread of [`slots`] replaces tx_thread, and has the clock besides; else the clock has a thread
 //! of its own ([`clock`]).
 //!
-//! Each thread is a participant of its own, since a participant has one bell. Neither waits for the other or takes
-//! memory from the heap for a package. System calls are made only for the datagram, for sleep, and to wake the receiver
-//! of a package.
+//! Each thread is a participant, since a participant has one bell. Neither waits for the other or takes memory from the
+//! heap for a package. System calls are made only for the datagram, for sleep, and to wake the receiver of a package.
 
 mod ages;
 mod answers;
@@ -32,6 +31,7 @@ pub(crate) mod sender_cache;
 mod sending;
 pub mod slots;
 mod socket;
+pub mod team;
 mod threads;
 pub(crate) mod transit;
 pub mod tunnel;
@@ -204,7 +204,7 @@ impl Shell {
         let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
         let via = transit::name(name);
         let transit = sender.receiver(via, transit::shape())?;
-        node.set_routes(via, &transit::ranges(&settings.routes))?;
+        node.set_routes(via, &transit::ranges(&settings.routes, &settings.moving))?;
         let shared = Arc::new(Shared::new(&sender));
         let answers = |participant| ErrorReplier::new(&settings, &stats, &faults, participant, via);
         let sealing = all.as_ref().map(|all| Sealing::new(all, Port::Packages));

@@ -1,16 +1,20 @@
 //! The router's mailbox: its name, its shape, and the names that are routed to it.
 
+use crate::moving::MovingNames;
 use rohrpost_config::TRANSIT;
 use rohrpost_mailbox::{Name, Shape, local};
 use rohrpost_network::Route;
 
-/// The ranges of names on other nodes, as the mailboxes of a node want them; adjacent ones are merged.
-pub(super) fn ranges(routes: &[Route]) -> Vec<(Name, Name)> {
+/// The ranges of names on other nodes, or that may be there, as the mailboxes of a node want them; adjacent ones are
+/// merged.
+pub(super) fn ranges(routes: &[Route], moving: &MovingNames) -> Vec<(Name, Name)> {
+    let mut all: Vec<_> = routes.iter().map(|route| (route.first, route.last)).chain(moving.ranges()).collect();
+    all.sort_unstable();
     let mut ranges: Vec<(Name, Name)> = Vec::new();
-    for route in routes {
+    for (first, last) in all {
         match ranges.last_mut() {
-            Some(last) if last.1.raw().checked_add(1) == Some(route.first.raw()) => last.1 = route.last,
-            _ => ranges.push((route.first, route.last)),
+            Some(before) if before.1.raw().checked_add(1) == Some(first.raw()) => before.1 = last,
+            _ => ranges.push((first, last)),
         }
     }
     ranges
@@ -41,7 +45,8 @@ mod tests {
         let name = |instance, local| Name::new(1, 9, instance, local);
         let route = |instance, node| Route { first: name(instance, 0), last: name(instance, 255), node };
         let routes = [route(0, 1), route(1, 2), route(3, 1)];
-        assert_eq!(ranges(&routes), [(name(0, 0), name(1, 255)), (name(3, 0), name(3, 255))]);
-        assert_eq!(ranges(&[]), []);
+        let moving = MovingNames::default();
+        assert_eq!(ranges(&routes, &moving), [(name(0, 0), name(1, 255)), (name(3, 0), name(3, 255))]);
+        assert_eq!(ranges(&[], &moving), []);
     }
 }

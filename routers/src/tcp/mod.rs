@@ -11,13 +11,13 @@
 
 mod bad_line;
 mod client;
-mod fault_writer;
+pub(crate) mod fault_writer;
 mod line_throttle;
 mod pace;
 mod replicas;
 mod seal;
 mod server;
-mod snapshots;
+pub(crate) mod snapshots;
 mod stream;
 mod validity;
 

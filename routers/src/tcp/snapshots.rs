@@ -6,7 +6,7 @@ use rohrpost_mailbox::{Priority, TimeRecord};
 use std::sync::{Mutex, PoisonError};
 
 /// Interval between two snapshots.
-pub(super) const SAY_EVERY_NS: u64 = 200_000_000;
+pub(crate) const SAY_EVERY_NS: u64 = 200_000_000;
 
 /// Members that are said one by one: with what else is said they must fit into a package.
 pub const MEMBERS_MAX: usize = 300;
@@ -28,7 +28,7 @@ pub struct Class {
 
 impl Class {
     /// All classes that did something.
-    pub(super) fn all(counts: &SessionCounts) -> Vec<Self> {
+    pub fn all(counts: &SessionCounts) -> Vec<Self> {
         let class = |(priority, counts): (Priority, &crate::session::SessionClassCounts)| {
             let lost = Cause::ALL.into_iter().map(|cause| (cause, counts.lost(cause))).filter(|(_, count)| *count > 0);
             Self {
@@ -66,14 +66,14 @@ pub struct Outage {
 
 impl Outage {
     /// It takes part.
-    pub(super) fn ends(&mut self, now_ns: u64) {
+    pub(crate) fn ends(&mut self, now_ns: u64) {
         if let Some((_, ended @ None)) = &mut self.last {
             *ended = Some(now_ns);
         }
     }
 
     /// It takes no part any more.
-    pub(super) fn begins(&mut self, now_ns: u64) {
+    pub(crate) fn begins(&mut self, now_ns: u64) {
         if self.last.is_none_or(|(_, ended)| ended.is_some()) {
             (self.last, self.count) = (Some((now_ns, None)), self.count + 1);
         }
@@ -132,14 +132,14 @@ pub struct Members {
 
 /// A value that one thread replaces, and others read, a few times a second.
 #[derive(Debug, Default)]
-pub(super) struct LatestValue<T>(Mutex<T>);
+pub(crate) struct LatestValue<T>(Mutex<T>);
 
 impl<T: Clone> LatestValue<T> {
-    pub(super) fn say(&self, value: T) {
+    pub(crate) fn say(&self, value: T) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = value;
     }
 
-    pub(super) fn get(&self) -> T {
+    pub(crate) fn get(&self) -> T {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }

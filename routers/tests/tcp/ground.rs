@@ -4,7 +4,7 @@ use crate::sealed::{Authority, seal};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type, local, monotonic_ns};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::session::client::ClientSettings;
-use rohrpost_routers::session::server::{Names, OwnNodes, ServerSettings};
+use rohrpost_routers::session::server::{MovingHosts, Names, OwnNodes, ServerSettings};
 use rohrpost_routers::shell::{Faults, Undelivered};
 use rohrpost_routers::tcp::{
     ClientParts, ClientSeal, ClientShell, LinkState, Members, ServerError, ServerParts, ServerSeal, ServerShell,
@@ -105,6 +105,7 @@ impl Router {
             common: COMMON,
             system: names.is_some().then_some((1, 1)),
             own_nodes: OwnNodes::default(),
+            moving: MovingHosts::default(),
             incarnation: self.incarnation,
             clients_max: 16,
             handshakes_max: 16,
@@ -184,11 +185,13 @@ impl System {
             settings,
             others: Vec::new(),
             hosts: vec![own],
+            registers: vec![own],
             beyond,
             faults,
             seal,
             keeps_time: false,
             impair: None,
+            team: None,
             replicas: None,
         };
         let client = ClientShell::start(parts).unwrap();

@@ -53,6 +53,12 @@ def package(to, sender, kind, id, body, priority, options=0, order="<"):
     return head + bytes([priority, options]) + body
 
 
+def fields(package):
+    """The fields of a package's head, and its body."""
+    head, body = package[:16], package[16:]
+    return struct.unpack((">" if head[15] & BIG_ENDIAN else "<") + "IIHhH", head[:14]) + (head[15], body)
+
+
 def command(interface, incarnation, sequence, valid_us, arguments):
     """The body of a command, its first try."""
     return struct.pack("<IIIII", interface, incarnation, sequence, valid_us, 0) + arguments
@@ -122,9 +128,7 @@ class Session:
             if kind == REFUSAL:
                 raise SystemExit(f"refused, reason {rest[5]}: {rest[24:].decode()}")
             if kind == PACKAGE:
-                head, body = rest[8:24], rest[24:]
-                order = ">" if head[15] & BIG_ENDIAN else "<"
-                return struct.unpack(order + "IIHhH", head[:14]) + (head[15], body)
+                return fields(rest[8:])
 
 
 def connect(address, port, certificates):

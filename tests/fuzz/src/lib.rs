@@ -10,10 +10,12 @@
 
 #![forbid(unsafe_code)]
 
+mod bundles;
 mod calls;
 mod config;
 mod descriptions;
 mod frames;
+mod grids;
 mod head;
 mod impairments;
 mod journals;
@@ -32,6 +34,8 @@ mod segments;
 mod sessions;
 mod split;
 mod streams;
+mod team_datagrams;
+mod teams;
 
 /// One target.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +47,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 19] = [
+pub const TARGETS: [Target; 26] = [
     Target { name: "head", run: head::run },
     Target { name: "names", run: names::run },
     Target { name: "config", run: config::run },
@@ -53,6 +57,7 @@ pub const TARGETS: [Target; 19] = [
     Target { name: "lines", run: lines::run },
     Target { name: "logs", run: logs::run },
     Target { name: "maps", run: maps::run },
+    Target { name: "grids", run: grids::run },
     Target { name: "recordings", run: recordings::run },
     Target { name: "journals", run: journals::run },
     Target { name: "log-control", run: log_control::run },
@@ -62,7 +67,13 @@ pub const TARGETS: [Target; 19] = [
     Target { name: "seals", run: seals::run },
     Target { name: "sessions", run: sessions::run },
     Target { name: "members", run: members::run },
+    Target { name: "bundles", run: bundles::run },
     Target { name: "impairments", run: impairments::run },
+    Target { name: "team-hellos", run: teams::run_hellos },
+    Target { name: "team-records", run: teams::run_records },
+    Target { name: "team-events", run: teams::run_events },
+    Target { name: "team-datagrams", run: team_datagrams::run },
+    Target { name: "team-hosts", run: team_datagrams::run_hosts },
 ];
 
 /// A target that must fail: it shows that the fuzzer finds planted mistakes.

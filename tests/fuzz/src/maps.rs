@@ -1,6 +1,6 @@
 //! Maps of the simulated world: a world, or what is wrong with the text.
 
-use rohrpost_robot::world::{MapError, World};
+use rohrpost_robot::world::{World, WorldError};
 
 pub(crate) fn run(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
@@ -12,16 +12,12 @@ pub(crate) fn run(data: &[u8]) {
     }
 }
 
-fn told(error: &MapError, text: &str) {
+fn told(error: &WorldError, text: &str) {
     assert!(!error.to_string().is_empty());
     let line = match error {
-        MapError::Header { line, .. }
-        | MapError::Ended { line, .. }
-        | MapError::Square { line, .. }
-        | MapError::RowLength { line, .. }
-        | MapError::TooLarge { line }
-        | MapError::SecondStart { line } => *line,
-        MapError::NotThisFormat(_) | MapError::NoStart | MapError::CellSize(_) => 1,
+        WorldError::Map(error) => error.line(),
+        WorldError::SecondStart { line, .. } => *line,
+        WorldError::NotThisFormat(_) | WorldError::NoStart | WorldError::CellSize(_) => 1,
     };
     assert!((1..=text.lines().count().max(1)).contains(&line), "{error}");
 }

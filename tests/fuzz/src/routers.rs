@@ -64,6 +64,7 @@ fn settings(own: NodeIndex, incarnation: u64) -> Settings {
         routes: vec![Route { first: module(other), last: module(other).with_local(u8::MAX), node: other }],
         senders: Vec::new(),
         hosts: Vec::new(),
+        moving: Default::default(),
         admission: Admission::default(),
         flows: Vec::new(),
         real_time_from: 0,

@@ -5,7 +5,7 @@ use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;
 use rohrpost_routers::session::client::{self, Client, ClientSettings};
 use rohrpost_routers::session::frame::{Carried, HEAD_BYTES, LENGTH_MAX, SessionFrameHead, SessionMessage};
-use rohrpost_routers::session::server::{self, OwnNodes, Server, ServerSettings, ServerStep};
+use rohrpost_routers::session::server::{self, MovingHosts, OwnNodes, Server, ServerSettings, ServerStep};
 use rohrpost_routers::session::{Cause, EndHost};
 
 pub(crate) const MS: u64 = 1_000_000;
@@ -65,6 +65,7 @@ pub(crate) fn server() -> Server {
         common: 7,
         system: None,
         own_nodes: OwnNodes::default(),
+        moving: MovingHosts::default(),
         incarnation: 5,
         clients_max: 3,
         handshakes_max: 2,

@@ -12,12 +12,17 @@
 
 mod copies;
 mod edit;
+mod generated;
+mod mistake;
 mod mistaken;
+mod models;
 mod process;
 mod variants;
 
 pub use copies::{copied, planted, without_inner_lines};
 pub use edit::{Change, Edit, and_not, before, edit, instead, left_out, or};
+pub use mistake::{Catalog, Mistake, all_pass_without_a_mistake, is_noticed, mistake};
 pub use mistaken::Mistaken;
-pub use process::{MISTAKE_VARIABLE, Ran, Verdict, is_made, run};
+pub use models::{Models, Part};
+pub use process::{MISTAKE_VARIABLE, Ran, Verdict, is_made, made, run};
 pub use variants::Variants;

@@ -1,9 +1,8 @@
 //! A copy of a crate with all mistakes of a catalogue, beside copies of the tests that must notice them.
 
-use crate::{Edit, copied, planted};
-use std::fmt::Write;
+use crate::generated::{copies_of_tests, lines, tests_of, write};
+use crate::{Mistake, planted};
 use std::path::Path;
-use std::{env, fs};
 
 /// What the build script of such a copy does.
 pub struct Mistaken<'a> {
@@ -15,43 +14,32 @@ pub struct Mistaken<'a> {
     pub started: &'a str,
     /// File of the catalogue.
     pub catalog: &'a str,
-    /// Each mistake, with its edits.
-    pub mistakes: Vec<(&'a str, &'a [Edit])>,
+    /// What it has.
+    pub mistakes: &'a [Mistake],
     /// What else changes in a file of the sources.
     pub finish: fn(&str, String) -> String,
 }
 
 impl Mistaken<'_> {
     /// Writes the copies, and `mistaken.rs`, which the crate includes: with a test of the name of each mistake, that
-    /// calls `noticed::is_noticed`. A change of the sources that leaves a mistake behind is an error of these tests and
-    /// not of the build.
+    /// looks it up in the crate's `catalog::MISTAKES`. A change of the sources that leaves a mistake behind is an error
+    /// of these tests and not of the build.
     ///
     /// # Panics
     /// Outside of a build script.
     pub fn write(&self) {
-        for read in [self.sources, self.tests, self.catalog] {
-            println!("cargo:rerun-if-changed={read}");
-        }
-        let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
-        let out = Path::new(&out);
-        let text = self.generate(out).unwrap_or_else(|error| format!("compile_error!({error:?});"));
-        fs::write(out.join("mistaken.rs"), text).expect("OUT_DIR can be written");
+        write("mistaken.rs", &[self.sources, self.tests, self.catalog], |out| self.generate(out));
     }
 
     fn generate(&self, out: &Path) -> Result<String, String> {
-        let (copy, tests) = (out.join("copy"), out.join("tests"));
-        planted(Path::new(self.sources), &copy, &self.mistakes, self.finish)?;
-        let files = copied(Path::new(self.tests), &tests, |file, text| {
-            Ok(if file == self.started { text } else { text.replace("#[test]", "#[test]\n#[ignore]") })
+        let copy = out.join("copy");
+        planted(Path::new(self.sources), &copy, &Mistake::edits(self.mistakes), self.finish)?;
+        let is_test = |file: &str| file != self.started;
+        let modules = copies_of_tests(self.tests, &out.join("tests"), |file, text| {
+            if is_test(file) { text.replace("#[test]", "#[test]\n#[ignore]") } else { text }
         })?;
-        let mut text = format!("include!({:?});\n", copy.join("lib.rs"));
-        for file in files.iter().filter(|file| *file != "main.rs") {
-            let (path, module) = (tests.join(file), file.trim_end_matches(".rs"));
-            writeln!(text, "#[path = {path:?}]\nmod {module};").expect("a String takes it");
-        }
-        for (name, _) in &self.mistakes {
-            writeln!(text, "#[test]\nfn {name}() {{ noticed::is_noticed({name:?}) }}").expect("a String takes it");
-        }
-        Ok(text)
+        Ok(lines([format!("include!({:?});", copy.join("lib.rs"))])
+            + &modules
+            + &tests_of(self.mistakes, "&[crate::catalog::MISTAKES]"))
     }
 }

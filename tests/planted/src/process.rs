@@ -10,10 +10,15 @@ pub const MISTAKE_VARIABLE: &str = "ROHRPOST_MISTAKE";
 /// notice is noticed always. The sources' own tests search on with new cases.
 const CASES: (&str, &str) = ("PROPTEST_RNG_SEED", "1");
 
+/// The mistake that this process makes.
+pub fn made() -> Option<&'static str> {
+    static MADE: OnceLock<Option<String>> = OnceLock::new();
+    MADE.get_or_init(|| std::env::var(MISTAKE_VARIABLE).ok()).as_deref()
+}
+
 /// Whether this process makes this mistake.
 pub fn is_made(mistake: &str) -> bool {
-    static MADE: OnceLock<Option<String>> = OnceLock::new();
-    MADE.get_or_init(|| std::env::var(MISTAKE_VARIABLE).ok()).as_deref() == Some(mistake)
+    made() == Some(mistake)
 }
 
 /// What came of one copied test.

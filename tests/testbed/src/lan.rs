@@ -46,6 +46,7 @@ pub fn settings(own: NodeIndex, addresses: &[IpAddr], tdma: Option<Tdma>) -> Set
         tdma,
         routes: others().map(module).chain(others().map(router)).map(route).collect(),
         senders: vec![vec![module(own)]],
+        moving: Default::default(),
         hosts: [module(own), router(own)].map(|name| (name, name.with_local(u8::MAX))).into(),
         admission: Admission {
             router: Some(router(own).class()),

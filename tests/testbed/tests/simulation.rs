@@ -3,6 +3,8 @@
 
 #[path = "simulated/guard.rs"]
 mod guard;
+#[path = "simulated/leases.rs"]
+mod leases;
 #[path = "simulated/rare.rs"]
 mod rare;
 #[path = "simulated/replicas.rs"]

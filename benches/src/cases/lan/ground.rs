@@ -11,7 +11,7 @@ use std::cell::Cell as Counter;
 pub(super) const WHOLE: u16 = u16::MAX;
 
 /// What all turns of a case share.
-pub(super) struct LanSegment {
+pub(in crate::cases) struct LanSegment {
     /// None if the system allows no namespaces.
     wire: Result<Wire, Failure>,
     /// None without the command, or if it does not start: then only the floors have figures.
@@ -21,7 +21,7 @@ pub(super) struct LanSegment {
 
 impl LanSegment {
     /// Makes the network and starts the routers.
-    pub(super) fn new(settings: &Settings, network: &Network) -> Self {
+    pub(in crate::cases) fn new(settings: &Settings, network: &Network) -> Self {
         Self::on(settings, network, Wire::new(network.mtu))
     }
 
@@ -44,7 +44,7 @@ impl LanSegment {
     }
 
     /// One way from module to module, µs.
-    pub(super) fn time(&self, cell: &Cell) -> Result<Vec<f64>, Failure> {
+    pub(in crate::cases) fn time(&self, cell: &Cell) -> Result<Vec<f64>, Failure> {
         let (nodes, turn) = self.turn()?;
         time_two_processes(cell, |end, meetings| nodes.module(end, turn, cell.bytes, meetings))
     }

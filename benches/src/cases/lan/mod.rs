@@ -2,7 +2,7 @@
 //! flood.
 
 pub(super) mod clock;
-mod ground;
+pub(super) mod ground;
 mod hop;
 mod junk;
 mod rates;

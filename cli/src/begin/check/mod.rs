@@ -67,6 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let missing = missing_programs(&installation, only)?;
     let mut notes = separated_by_size(&installation);
+    notes.extend(rohrpost_builtin::notes(&installation));
     notes.extend(notes::records_too_large(&installation));
     notes.extend(daemons_here(&installation, Path::new("/proc")));
     let base = base_directory();

@@ -6,19 +6,14 @@ use super::recording::{recorder, start_early};
 use crate::begin::check;
 use crate::nodes::keys::certificates::{self, Renewal};
 use crate::terminal::Failure;
+use rohrpost_config::examples::{BUILDING, CHAOS, LOG, NODES, SIMULATION, TCP, TDMA};
 use rohrpost_config::{GUI, Installation, Keys, Program};
 use rohrpost_routers::security::random;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};
 
-const SIMULATION: &str = include_str!("../../../../config/demo.toml");
-const LOG: &str = include_str!("../../../../config/demo-log.toml");
-const NODES: &str = include_str!("../../../../config/demo-nodes.toml");
-const TDMA: &str = include_str!("../../../../config/demo-tdma.toml");
-const TCP: &str = include_str!("../../../../config/demo-tcp.toml");
 /// The end of a demo's own configuration, by which it is known in recordings: what it names is [`BUILDING`].
 const BUILT_IN: &str = "\n# Built into `rohrpost demo`.\n";
-const BUILDING: &str = include_str!("../../../../config/building.map");
 
 /// Folders of keys and certificates, beside the copy.
 const KEYS: &str = "keys";
@@ -33,6 +28,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     }
     let (name, text) = match (&arguments.log, arguments.nodes) {
         (Some(_), _) => ("demo-log.toml", LOG),
+        (None, Some(2..)) if arguments.chaos.is_some() => ("demo-chaos.toml", CHAOS),
         (None, Some(2..)) if arguments.tdma => ("demo-tdma.toml", TDMA),
         (None, Some(2..)) if arguments.gui == GuiConnection::Tcp => ("demo-tcp.toml", TCP),
         (None, Some(2..)) => ("demo-nodes.toml", NODES),
@@ -43,7 +39,12 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     if arguments.config.is_some() && !there {
         return Err(format!("{}: no such file", own.display()).into());
     }
-    let is_changed = arguments.no_gui || arguments.viewer || arguments.secure || arguments.record.is_some();
+    let is_changed = arguments.no_gui
+        || arguments.viewer
+        || arguments.secure
+        || arguments.record.is_some()
+        // The arena's socket is to be in a folder of this run.
+        || arguments.chaos.is_some();
     if there && arguments.log.is_none() && !is_changed {
         return Ok(check::load(&own)?);
     }

@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     let lab = lab(&installation)?;
     let speech = Speech::begin()?;
     installation.security_texts().iter().for_each(|security| speech.say(security));
-    let mut nodes = LaunchedNodes::begin(installation.clone(), lab, arguments.impair, None, &speech)?;
+    let mut nodes = LaunchedNodes::begin([installation.clone()], lab, arguments.impair, None, &speech)?;
     let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == GuiConnection::Tcp)];
     let victims = victims.into_iter().filter(|(_, is_one)| *is_one).map(|(victim, _)| victim).collect();
     let summary =

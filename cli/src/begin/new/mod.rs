@@ -10,6 +10,8 @@ use std::process::ExitCode;
 
 /// Rohrpost's sources that this command was built from; they contain the library.
 const BUILT_FROM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+/// Sources that are installed with this command, from the folder of its executable.
+const INSTALLED: &str = "../share/rohrpost/src";
 
 /// A file of the project: its path, and its content with `{{…}}` for placeholders.
 type Template = (&'static str, &'static str);
@@ -61,7 +63,7 @@ pub(crate) struct Arguments {
     /// Folder of the project; default: NAME in the present folder.
     #[arg(long, value_name = "DIR")]
     path: Option<PathBuf>,
-    /// Folder of Rohrpost's sources; default: where this command was built from.
+    /// Folder of Rohrpost's sources; default: those installed with this command, else where it was built from.
     #[arg(long, value_name = "DIR")]
     rohrpost: Option<PathBuf>,
 }
@@ -105,11 +107,16 @@ fn fill(template: &str, name: &ModuleName, rohrpost: &str) -> String {
     filled.replace("{{Type}}", &name.type_name()).replace("{{rohrpost}}", rohrpost)
 }
 
+fn holds_library(folder: &Path) -> bool {
+    fs::read_to_string(folder.join("Cargo.toml")).is_ok_and(|manifest| manifest.contains("name = \"rohrpost\""))
+}
+
 /// Rohrpost's dependency line for a Cargo.toml.
 fn sources(given: Option<&Path>) -> Result<String, Failure> {
-    let folder = given.unwrap_or(Path::new(BUILT_FROM));
-    let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
-    if !manifest.contains("name = \"rohrpost\"") {
+    let installed = std::env::current_exe().ok().and_then(|program| Some(program.parent()?.join(INSTALLED)));
+    let own = installed.filter(|folder| holds_library(folder)).unwrap_or_else(|| BUILT_FROM.into());
+    let folder = given.unwrap_or(&own);
+    if !holds_library(folder) {
         let why = if given.is_some() { "holds" } else { "was where this command was built, and holds" };
         return Err(format!(
             "{} {why} no sources of Rohrpost; say where they are with --rohrpost DIR",

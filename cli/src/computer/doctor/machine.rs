@@ -2,7 +2,9 @@
 
 use super::lan::LanView;
 use super::protection::Protection;
+use rohrpost::interfaces::ControlState;
 use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
+use rohrpost_launch::survey::Standing;
 use rohrpost_mailbox::sys::{self, Room};
 use rohrpost_mailbox::{Node, NodeError, SystemClock, base_directory, monotonic_ns, realtime_ns, saturating_sum};
 use std::path::{Path, PathBuf};
@@ -19,13 +21,26 @@ pub(super) struct Needs {
     /// The viewer's bridge, if the configuration has it.
     pub(super) bridge: Option<PathBuf>,
     pub(super) processes: usize,
+    /// What supervises motors there.
+    pub(super) supervisors: Vec<Supervisor>,
+    /// Modules with several nodes, of which it is one.
+    pub(super) seats: Vec<Seat>,
     /// The configuration's file.
     pub(super) from: Option<PathBuf>,
 }
 
 impl Default for Needs {
     fn default() -> Self {
-        Self { priority: FIFO_MAX, memory: 0, gui: false, bridge: None, processes: 1, from: None }
+        Self {
+            priority: FIFO_MAX,
+            memory: 0,
+            gui: false,
+            bridge: None,
+            processes: 1,
+            supervisors: Vec::new(),
+            seats: Vec::new(),
+            from: None,
+        }
     }
 }
 
@@ -42,9 +57,33 @@ impl Needs {
             gui: !installation.gui.show.is_empty(),
             bridge: modules().find_map(|module| bridge_of(installation, module)),
             processes: modules().count(),
+            supervisors: Vec::new(),
+            seats: Vec::new(),
             from: Some(installation.path.clone()),
         }
     }
+}
+
+/// A wormhole of the configuration, on this node.
+pub(super) struct Supervisor {
+    pub(super) module: String,
+    /// Its SCHED_FIFO priority; none: the normal scheduler.
+    pub(super) fifo: Option<u8>,
+    /// What it says, or why it does not; none while its node does not run.
+    pub(super) says: Option<Result<ControlState, String>>,
+}
+
+/// A module with several nodes, as one of them sees it.
+pub(super) struct Seat {
+    pub(super) module: String,
+    /// The node that sees it.
+    pub(super) node: String,
+    /// The node that grants its lease.
+    pub(super) witness: String,
+    /// The node that is known to hold its lease.
+    pub(super) holder: Option<String>,
+    /// How it stands at `node`, and its last error; none while that does not run.
+    pub(super) here: Option<(Standing, String)>,
 }
 
 /// The path of a module's program, if that is the bridge.

@@ -10,6 +10,8 @@ mod place;
 mod protection;
 mod rights;
 mod security;
+mod standby;
+mod supervision;
 
 use crate::terminal::{Failure, say, say_folded};
 use finding::{Finding, Grade};
@@ -47,6 +49,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let installation = crate::begin::check::load(file)?;
         let node = choose_node(&installation, arguments.node.as_deref())?;
         needs = Needs::of(&installation, node);
+        needs.supervisors = supervision::supervisors(&installation, node);
+        needs.seats = standby::seats(&installation, node);
         lan = network::ask(&installation, node);
         protection = Protection::of(&installation, &node.name);
     }
@@ -67,6 +71,8 @@ fn examine(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     let mut findings = kernel::findings(machine);
     findings.extend(rights::findings(machine, needs));
     findings.extend(place::findings(machine, needs));
+    findings.extend(supervision::findings(machine, needs));
+    findings.extend(standby::findings(needs));
     findings.extend(security::findings(machine, needs));
     findings.extend(network::findings(machine, needs));
     findings

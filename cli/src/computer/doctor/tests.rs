@@ -1,9 +1,11 @@
 //! Output of `doctor` for recorded computers and networks.
 
 use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
-use super::machine::{Bridge, KernelFacts, NodeDirectory, NodeFound, StreamsFound};
+use super::machine::{Bridge, KernelFacts, NodeDirectory, NodeFound, Seat, StreamsFound, Supervisor};
 use super::protection::{LanProtection, Tcp};
 use super::*;
+use rohrpost::interfaces::{ControlMode, ControlState, HeldHalt};
+use rohrpost_launch::survey::Standing;
 use rohrpost_mailbox::{LAYOUT_VERSION, NodeError, sys::Room};
 use std::fs;
 use std::path::Path;
@@ -107,6 +109,15 @@ fn node(path: &str, seen: NodeDirectory, number: usize) -> NodeFound {
     NodeFound { path: path.into(), seen, streams, clock_set_by_ns: None }
 }
 
+/// One that runs.
+fn wormhole(state: ControlState) -> Supervisor {
+    Supervisor { module: "wormhole.0".into(), fifo: Some(39), says: Some(Ok(state)) }
+}
+
+fn seeing() -> ControlState {
+    ControlState { sees: true, driven_by: "pilot.0".into(), ..ControlState::default() }
+}
+
 fn good() -> (KernelFacts, Needs) {
     let asked = KernelFacts {
         fifo: Ok(()),
@@ -120,7 +131,19 @@ fn good() -> (KernelFacts, Needs) {
         wall_ns: SET_NS,
     };
     let from = Some("robot.toml".into());
-    (asked, Needs { priority: 34, memory: 4 << 20, gui: true, bridge: None, processes: 6, from })
+    (
+        asked,
+        Needs {
+            priority: 34,
+            memory: 4 << 20,
+            gui: true,
+            bridge: None,
+            processes: 6,
+            supervisors: vec![wormhole(seeing())],
+            seats: vec![seat(Standing::StandsBy)],
+            from,
+        },
+    )
 }
 
 fn bad() -> (KernelFacts, Needs) {
@@ -147,7 +170,19 @@ fn bad() -> (KernelFacts, Needs) {
         wall_ns: 61_000_000_000,
     };
     let from = Some("robot.toml".into());
-    (asked, Needs { priority: 34, memory: 40 << 20, gui: true, bridge: None, processes: 6, from })
+    (
+        asked,
+        Needs {
+            priority: 34,
+            memory: 40 << 20,
+            gui: true,
+            bridge: None,
+            processes: 6,
+            supervisors: vec![wormhole(seeing())],
+            seats: vec![Seat { holder: None, ..seat(Standing::StandsBy) }],
+            from,
+        },
+    )
 }
 
 /// As in the systemd unit, in /run: the text must name /run, not /dev/shm.
@@ -228,6 +263,56 @@ fn full_shared_memory_is_bad() {
         let found = examined("run", (asked, Needs::default()));
         let found = found.iter().find(|finding| finding.what == "shared memory").unwrap();
         assert_eq!(found.state, state, "{found:?}");
+    }
+}
+
+/// Each of them is told by another line, with its own fix.
+#[test]
+fn what_keeps_a_wormhole_from_its_work_is_told() {
+    let halts = vec![HeldHalt { holder: "anna@desk".into(), number: 1 }];
+    let silent = Supervisor { says: Some(Err("no answer".into())), ..wormhole(seeing()) };
+    let under_normal = Supervisor { fifo: None, ..wormhole(seeing()) };
+    for (supervisor, state, fix) in [
+        (wormhole(seeing()), Grade::Ok, None),
+        (Supervisor { says: None, ..wormhole(seeing()) }, Grade::Ok, None),
+        (under_normal, Grade::Warn, Some("128")),
+        (silent, Grade::Bad, Some("rohrpost start wormhole.0")),
+        (wormhole(ControlState { mode: ControlMode::Failed, ..seeing() }), Grade::Warn, Some("wormhole.0 reset")),
+        (wormhole(ControlState { halts, ..seeing() }), Grade::Warn, Some("rohrpost resume")),
+        (wormhole(ControlState::default()), Grade::Warn, Some("`laser` of wormhole.0")),
+        (wormhole(ControlState { late_looks: 3, ..seeing() }), Grade::Warn, Some("`late-ms`")),
+    ] {
+        let (asked, needs) = good();
+        let found = examined("good", (asked, Needs { supervisors: vec![supervisor], ..needs }));
+        let found = found.iter().find(|finding| finding.what == "supervision").unwrap();
+        let is_told = fix.is_none_or(|fix| found.fix.as_ref().is_some_and(|told| told.contains(fix)));
+        assert!(found.state == state && is_told, "{found:?}");
+    }
+}
+
+/// One that its holder and its witness have.
+fn seat(standing: Standing) -> Seat {
+    let [module, node, witness, holder] = ["pilot.0", "desk", "base", "brain"].map(str::to_owned);
+    Seat { module, node, witness, holder: Some(holder), here: Some((standing, "why".into())) }
+}
+
+#[test]
+fn what_keeps_a_standby_from_its_work_is_told() {
+    let start = Some("rohrpost start pilot.0 --node desk");
+    for (seat, state, fix) in [
+        (seat(Standing::StandsBy), Grade::Ok, None),
+        (seat(Standing::On), Grade::Ok, None),
+        (Seat { here: None, ..seat(Standing::On) }, Grade::Ok, None),
+        (seat(Standing::Failed), Grade::Bad, start),
+        (seat(Standing::Stopped), Grade::Warn, start),
+        (seat(Standing::Starting), Grade::Warn, Some("rohrpost log pilot.0")),
+        (Seat { holder: None, ..seat(Standing::StandsBy) }, Grade::Bad, Some("rohrpost launch FILE --node base")),
+    ] {
+        let (asked, needs) = good();
+        let found = examined("good", (asked, Needs { seats: vec![seat], ..needs }));
+        let found = found.iter().find(|finding| finding.what == "standby").unwrap();
+        let is_told = fix.is_none_or(|fix| found.fix.as_ref().is_some_and(|told| told.contains(fix)));
+        assert!(found.state == state && is_told, "{found:?}");
     }
 }
 

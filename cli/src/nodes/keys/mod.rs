@@ -7,6 +7,7 @@ use crate::terminal::units::counted;
 use crate::terminal::{Failure, say};
 use certificates::Renewal;
 use clap::{Args, Subcommand};
+use rohrpost_bundle::{SECRET_FILE, SigningKey};
 use rohrpost_config::{Installation, Key, Keys};
 use rohrpost_routers::security::{self, InstallationKey, KeyId};
 use std::path::{Path, PathBuf};
@@ -18,6 +19,8 @@ use std::time::Duration;
   rohrpost keys new robot.toml       all missing keys and certificates of the file
   rohrpost keys rotate robot.toml    another key, and new certificates; the older key stays valid until `finish`
   rohrpost keys finish robot.toml
+  rohrpost keys new team-keys        the key that all systems of [team] share
+  rohrpost keys bundle               the key that signs bundles (`rohrpost bundle`)
 Datagrams (`security = \"keys\"` in [network]) are sealed with one file, `udp.keys`, the same on every node. Sessions \
     with the TCP router (`security = \"tls\"` in [tcp]) need a certificate and its key for each node, and for the TCP \
     router; each needs `ca.pem` and its own two files. Copy them as safely as passwords, and keep `ca.key`, which \
@@ -45,6 +48,12 @@ enum Step {
     },
     /// Drop the older key, when all nodes have the newer one.
     Finish(Place),
+    /// Make the key that signs bundles, `bundle.key`, and its public half for nodes, `bundle.pub`.
+    Bundle {
+        /// Folder of the keys.
+        #[arg(value_name = "FOLDER", default_value = "keys")]
+        folder: PathBuf,
+    },
     /// Show keys as fingerprints, which do not reveal them, their age, and how long certificates are valid.
     Show(Place),
 }
@@ -60,8 +69,11 @@ struct Place {
 }
 
 struct KeyFiles {
-    /// The file of the keys that seal datagrams, if there are to be any.
+    /// The file of the keys that seal datagrams between nodes, if there are to be any.
     datagrams: Option<PathBuf>,
+    /// That of the keys of the team, if the configuration seals what systems send to each other. Other systems have it,
+    /// too, so this configuration does not change it.
+    team: Option<PathBuf>,
     installation: Option<Installation>,
 }
 
@@ -71,19 +83,40 @@ impl KeyFiles {
             return Err(format!("{}: no such file", path.display()).into());
         }
         if !path.is_file() {
-            return Ok(Self { datagrams: Some(Keys::file(path)), installation: None });
+            return Ok(Self { datagrams: Some(Keys::file(path)), team: None, installation: None });
         }
         let installation = load(path)?;
         let datagrams = installation.keys.as_deref().map(Keys::file);
-        if datagrams.is_none() && certificates::folder(&installation).is_none() {
+        let team = installation.team.as_ref().and_then(|team| team.keys.as_deref()).map(Keys::file);
+        if datagrams.is_none() && team.is_none() && certificates::folder(&installation).is_none() {
             return Err(format!(
                 "{}: nothing here is sealed; write `security = \"keys\"` in [network], for several nodes on a LAN, or \
-                 `security = \"tls\"` and `certificates = \"certificates\"` in [tcp]",
+                 in [team], or `security = \"tls\"` and `certificates = \"certificates\"` in [tcp]",
                 path.display()
             )
             .into());
         }
-        Ok(Self { datagrams, installation: Some(installation) })
+        Ok(Self { datagrams, team, installation: Some(installation) })
+    }
+
+    /// All files of keys that seal datagrams.
+    fn all_datagrams(&self) -> impl Iterator<Item = &PathBuf> {
+        let team = self.team.as_ref().filter(|team| self.datagrams.as_ref() != Some(team));
+        self.datagrams.iter().chain(team)
+    }
+
+    /// Says how the keys are changed that this configuration alone must not change, if there are no others.
+    fn refuse_team_alone(&self, step: &str) -> Result<(), Failure> {
+        let certificates = self.installation.as_ref().and_then(certificates::folder);
+        match self.team.as_deref().and_then(Path::parent) {
+            Some(folder) if self.datagrams.is_none() && certificates.is_none() => Err(format!(
+                "all systems of the team have its keys; `rohrpost keys {step} {}` changes them, then copy that folder \
+                 to each system",
+                folder.display()
+            )
+            .into()),
+            _ => Ok(()),
+        }
     }
 
     /// Makes certificates, and prints the new files.
@@ -99,6 +132,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Step::New(place) => new(&KeyFiles::by(&place.path)?, place.days)?,
         Step::Rotate { place, authority } => rotate(&KeyFiles::by(&place.path)?, *authority, place.days)?,
         Step::Finish(place) => finish(&KeyFiles::by(&place.path)?)?,
+        Step::Bundle { folder } => bundle(folder)?,
         Step::Show(place) => show(&KeyFiles::by(&place.path)?)?,
     };
     say(lines.join("\n"));
@@ -107,7 +141,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 fn new(wanted: &KeyFiles, days: u32) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
-    if let Some(file) = &wanted.datagrams {
+    for file in wanted.all_datagrams() {
         // Several systems of an installation may share a folder.
         if wanted.installation.is_none() || !file.exists() {
             let keys = Keys::first(security::random()?);
@@ -124,6 +158,7 @@ fn new(wanted: &KeyFiles, days: u32) -> Result<Vec<String>, Failure> {
 }
 
 fn rotate(wanted: &KeyFiles, authority: bool, days: u32) -> Result<Vec<String>, Failure> {
+    wanted.refuse_team_alone("rotate")?;
     let rotated = |file: &PathBuf| Ok::<_, Failure>((file.clone(), Keys::load(file)?.rotated(security::random()?)?));
     let keys = wanted.datagrams.as_ref().map(rotated).transpose()?;
     // This comes first: if a later step fails, certificates can be made again, but a key must not change twice.
@@ -138,6 +173,7 @@ fn rotate(wanted: &KeyFiles, authority: bool, days: u32) -> Result<Vec<String>, 
 }
 
 fn finish(wanted: &KeyFiles) -> Result<Vec<String>, Failure> {
+    wanted.refuse_team_alone("finish")?;
     let Some(file) = &wanted.datagrams else {
         return Err("certificates need no `finish`: old ones are valid until they expire".into());
     };
@@ -148,12 +184,21 @@ fn finish(wanted: &KeyFiles) -> Result<Vec<String>, Failure> {
 
 fn show(wanted: &KeyFiles) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
-    if let Some(file) = &wanted.datagrams {
+    for file in wanted.all_datagrams() {
         lines.push(text(file, &Keys::load(file)?));
         lines.extend(age(file));
     }
     lines.extend(wanted.installation.iter().flat_map(certificates::show));
     Ok(lines)
+}
+
+fn bundle(folder: &Path) -> Result<Vec<String>, Failure> {
+    let fingerprint = SigningKey::create(folder)?.public().fingerprint();
+    let file = folder.join(SECRET_FILE);
+    Ok(vec![
+        format!("{}: signs bundles, fingerprint {fingerprint}; keep it where bundles are made", file.display()),
+        format!("{}: copy it to /var/lib/rohrpost/trusted/ of each node", file.with_extension("pub").display()),
+    ])
 }
 
 /// Age of the file: the time since its keys were made, changed, or copied here.

@@ -39,6 +39,23 @@ fn keys_are_made_changed_and_shown_only_as_fingerprints() {
     assert_eq!(Keys::load(&file).unwrap(), Keys { older: None, ..both });
 }
 
+#[test]
+fn keys_of_a_team_are_made_from_its_file_and_changed_only_by_their_folder() {
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("team.toml");
+    std::fs::write(&file, include_str!("../../../../config/tests/team.toml")).unwrap();
+    step(Step::New, &file).unwrap();
+    let folder = place.path().join("keys-of-all");
+    let made = Keys::load(&Keys::file(&folder)).unwrap();
+    step(Step::New, &file).unwrap();
+    step(Step::Show, &file).unwrap();
+    for (refused, word) in [(step(rotate, &file), "rotate"), (step(Step::Finish, &file), "finish")] {
+        let right = format!("rohrpost keys {word} {}", folder.display());
+        assert!(refused.unwrap_err().contains(&right), "{word}");
+    }
+    assert_eq!(Keys::load(&Keys::file(&folder)).unwrap(), made, "and nothing was changed");
+}
+
 /// A robot of two computers and a laptop; the installation has this name.
 fn robot(place: &Path, installation: &str) -> PathBuf {
     let text = include_str!("../../../../config/demo-tcp.toml")

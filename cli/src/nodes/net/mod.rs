@@ -4,6 +4,7 @@
 pub(crate) mod beyond;
 mod node_report;
 mod show;
+mod team;
 
 use crate::nodes::quantities::legend;
 use crate::nodes::round::{Round, Rounds};
@@ -13,7 +14,7 @@ use node_report::{NodeReport, rates};
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondLink, ClassPassed, LinkCounters, RouterInterface, SlotState,
-    TcpInterface, TunnelState,
+    TcpInterface, TeamLinks, TeamNode, TeamRouterInterface, TunnelState,
 };
 use rohrpost::serde::de::DeserializeOwned;
 use std::process::ExitCode;
@@ -26,8 +27,8 @@ const EXAMPLES: &str = "Examples:
   rohrpost net                all nodes, once
   rohrpost net --watch        repeatedly; Ctrl-C ends it
   rohrpost net --node arm --json
-Exit code 1: a router or a client of the TCP router does not answer, a peer is not alive, or a client is not \
-    connected.
+Exit code 1: a router or a client of the TCP router does not answer, a peer is not alive, a client is not \
+    connected, or the network of [team] is not there.
 ";
 
 /// Examples, and what each counter means.
@@ -41,6 +42,8 @@ fn help() -> String {
         ("Of the TCP router", legend::<BeyondClients>()),
         ("Of what went beyond the share of a certificate or address there", legend::<BeyondCrowded>()),
         ("Of a class there, and at its clients", legend::<ClassPassed>()),
+        ("Of a node of another system, by [team]", legend::<TeamNode>()),
+        ("Of a router of [team]", legend::<TeamLinks>()),
     ];
     parts.into_iter().fold(EXAMPLES.to_owned(), |text, (of, lines)| format!("{text}{of}:\n{lines}"))
 }
@@ -55,7 +58,8 @@ pub(crate) struct Arguments {
 pub(crate) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
     let mut round = rounds.begin(|installation| {
         let alone = "this installation has one node, and so no routers; `rohrpost list` shows what runs";
-        (installation.network.is_none() && installation.tcp.is_none()).then(|| alone.into())
+        let has_none = installation.network.is_none() && installation.tcp.is_none() && installation.team.is_none();
+        has_none.then(|| alone.into())
     })?;
     let mut before = look(&mut round);
     let mut vocabulary = Vocabulary::default();
@@ -97,6 +101,12 @@ fn ask(round: &mut Round, node: String) -> NodeReport {
     if let Some(client) = client {
         match round.newest_of(client, TcpInterface::LINK) {
             Ok((_, link)) => told.beyond = Some(link),
+            Err(failure) => told.failure = told.failure.or(Some(failure)),
+        }
+    }
+    if let Some(router) = round.running.installation.team_router_of(&told.node) {
+        match round.newest_of(router, TeamRouterInterface::LINKS) {
+            Ok((_, links)) => told.team = Some(links),
             Err(failure) => told.failure = told.failure.or(Some(failure)),
         }
     }

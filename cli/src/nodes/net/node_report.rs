@@ -2,6 +2,7 @@
 
 use rohrpost::interfaces::{
     BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, LinkState, Links, ReplicaStates, SlotState,
+    TeamLinks,
 };
 use serde::Serialize;
 
@@ -23,6 +24,9 @@ pub(super) struct NodeReport {
     /// The TCP router's report, if it runs there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) clients: Option<BeyondClients>,
+    /// The state of its router of the team.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) team: Option<TeamLinks>,
     /// Bytes and packages a second, by peer; empty on the first poll.
     pub(super) rates: Vec<Rates>,
     /// Why there is no report.
@@ -51,12 +55,14 @@ impl NodeReport {
         }
     }
 
-    /// Whether its routers answer, all its peers are there, and the TCP router is connected.
+    /// Whether its routers answer, all its peers are there, the TCP router is connected, and the network
+    /// of the team is there. Other systems may come and go.
     pub(super) fn is_well(&self) -> bool {
         let all_alive = |links: &Links| links.peers.iter().all(|peer| peer.state == LinkState::Alive);
         self.failure.is_none()
             && self.links.as_ref().is_none_or(all_alive)
             && self.beyond.as_ref().is_none_or(|link| link.state == BeyondState::Up)
+            && self.team.as_ref().is_none_or(|team| team.why.is_empty())
     }
 }
 

@@ -1,7 +1,7 @@
 //! The output of `rohrpost net` for people.
 
-use super::beyond;
 use super::node_report::NodeReport;
+use super::{beyond, team};
 use crate::look::target::Running;
 use crate::nodes::quantities::counted;
 use crate::nodes::tables::{self, by_class, kept};
@@ -27,6 +27,7 @@ pub(super) fn text(running: &Running, all: &[NodeReport], vocabulary: &mut Vocab
     parts.push(kept(all.iter().filter_map(|told| told.slots.as_ref())));
     parts.extend([measured(running, all, vocabulary), replicas(all)]);
     parts.extend(beyond::text(running, all));
+    parts.extend(team::text(running, all));
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
 }

@@ -1,12 +1,13 @@
 //! The calls of `top`: to switch modules on and off, for output lines, for the causes of errors. Nothing here blocks:
 //! calls are begun, and polled in each round, so that a module that hangs freezes no screen.
 
+use crate::look::control::STATE;
 use crate::look::observer::{PATIENCE, Silence, Tool, silence};
 use crate::look::target::Running;
 use rohrpost::CallError;
 use rohrpost::Name;
 use rohrpost::common::{self, Status};
-use rohrpost::interfaces::{CollectorInterface, Page};
+use rohrpost::interfaces::{CollectorInterface, ControlState, Page, SupervisorInterface};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_launch::launcher::{AskLaunch, ControlError, SnapshotRequest, launcher_of};
 use rohrpost_launch::survey::{Distant, Scope, Snapshot, Survey};
@@ -21,6 +22,7 @@ enum Purpose {
     Switch(bool),
     Lines,
     Why,
+    Control,
     Restart(Name),
 }
 
@@ -30,6 +32,8 @@ pub(super) enum Answer {
     Done(String),
     Lines(Result<Page, String>),
     Why(Name, String),
+    /// How it stands with a motor, by its supervisor.
+    Control(Name, ControlState),
     /// Another node's report, or why it does not answer.
     Snapshot(String, Result<Survey, Silence>),
 }
@@ -86,6 +90,12 @@ impl Calls {
     pub(super) fn why(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let begun = self.tool.begin(module, common::STATUS, common::HASH, |_| Ok(()));
         self.begun(running, module, Purpose::Why, begun)
+    }
+
+    /// Asks a supervisor how it stands with its motor.
+    pub(super) fn control(&mut self, running: &Running, supervisor: Name) -> Option<Answer> {
+        let begun = self.tool.begin(supervisor, STATE, SupervisorInterface::hash(), |_| Ok(()));
+        self.begun(running, supervisor, Purpose::Control, begun)
     }
 
     /// Records a call that was begun; a call that could not begin gets its error as the answer.
@@ -150,6 +160,7 @@ impl Calls {
                 Err(error) => failed(running, to, purpose, &unread(&error)),
             },
             Purpose::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
+            Purpose::Control => from_bytes(bytes).ok().map(|state| Answer::Control(to, state)),
             Purpose::Restart(module) => match from_bytes::<Result<u32, ControlError>>(bytes) {
                 Ok(Ok(_)) => Some(Answer::Done(format!("{} is being restarted", running.text(module)))),
                 Ok(Err(error)) => Some(Answer::Done(error.to_string())),
@@ -172,6 +183,6 @@ fn failed(running: &Running, to: Name, purpose: Purpose, error: &CallError) -> O
     match purpose {
         Purpose::Switch(_) | Purpose::Restart(_) => Some(Answer::Done(told)),
         Purpose::Lines => Some(Answer::Lines(Err(told))),
-        Purpose::Why => None,
+        Purpose::Why | Purpose::Control => None,
     }
 }

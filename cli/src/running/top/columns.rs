@@ -62,7 +62,8 @@ columns! {
     Node: "node", 8, 2, Text(|row| row.line.node.clone()), "where it runs; shown when there are several nodes";
     State: "state", 8, 1,
         Ranked(|row| row.line.account.state.to_string(), |row| row.line.account.state.severity()),
-        "starting, on, off, stopped; error; busy: its code does not return; restarting; failed: given up; unreachable";
+        "starting, on, off, stopped; standby: another node runs it; error; busy: its code does not return; restarting; \
+         failed: given up; unreachable";
     Class: "class", 7, 16, Text(|row| row.class.clone()), "its class, which gives its importance";
     Priority: "prio", 4, 11, Number(|row| Some(row.line.priority.into()), whole),
         "class id = priority of its commands, 255 most urgent";

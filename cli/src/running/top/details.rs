@@ -2,11 +2,13 @@
 
 use super::columns::{memory, short};
 use super::model::{FlowEnd, Model, Row, Sample};
+use crate::look::control::control_lines;
 use crate::look::summary::{Bar, bars, print_classes};
 use crate::running::call::usage;
 use crate::running::list::mailbox_lines;
 use crate::terminal::table::{table, time};
 use rohrpost::Name;
+use rohrpost::interfaces::ControlState;
 use rohrpost::output::plain;
 use rohrpost::schema::{Description, describe_field, describe_result};
 use rohrpost_config::{Installation, Program};
@@ -14,19 +16,23 @@ use rohrpost_launch::survey::{StreamSurvey, sum};
 use rohrpost_mailbox::{Latency, MailboxInfo};
 use std::time::Duration;
 
-/// The page as lines; headings begin without a blank. `describe` returns a module's description.
+/// The page as lines; headings begin without a blank. `control`: what it told, if it is a supervisor; `describe`
+/// returns a module's description.
 pub(super) fn page(
     installation: &Installation,
     sample: &Sample,
     model: &Model,
     name: Name,
-    mut describe: impl FnMut(Name) -> Option<Description>,
+    (control, mut describe): (Option<&ControlState>, impl FnMut(Name) -> Option<Description>),
 ) -> Vec<String> {
     let Some(row) = model.row(name) else {
         return vec![format!("{} no longer exists", installation.classes.format(name))];
     };
     let mut lines = vec![format!("{}: {}", row.line.module, row.line.account.state)];
     lines.extend(indented(&about(installation, sample, row)));
+    for (what, text) in control.into_iter().flat_map(control_lines) {
+        lines.push(format!("  {what:<11}{text}"));
+    }
     let module = sample.survey.module(name);
     let is_own = |name: Name| {
         let of = name.module();
@@ -104,8 +110,7 @@ fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
         };
         say("process", format!("{}, for {}{restarts}, {}", process.pid, span(since), row.line.scheduling));
         if let Some(watchdog) = installation.module(row.name).and_then(|module| module.watchdog) {
-            let lasts = process.in_hand.zip(module.at_ns).map(|(turn, at_ns)| turn.lasts(at_ns));
-            let turn = lasts.map(|lasts| format!("; in a turn for {lasts:.1?}"));
+            let turn = module.in_turn.map(|lasts| format!("; in a turn for {lasts:.1?}"));
             say("watchdog", format!("{watchdog}{}", turn.unwrap_or_default()));
         }
         let percent = row.cpu_percent.map_or("-".into(), |percent| format!("{percent:.1}"));

@@ -271,7 +271,7 @@ impl Palette {
                 Standing::Failed | Standing::Busy | Standing::Error => {
                     self.coloured(Color::Red).add_modifier(Modifier::BOLD)
                 }
-                Standing::Stopped => Style::new(),
+                Standing::Stopped | Standing::StandsBy => Style::new(),
                 Standing::Starting | Standing::Off | Standing::Restarting { .. } | Standing::Unreachable => {
                     self.coloured(Color::Yellow)
                 }

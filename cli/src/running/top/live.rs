@@ -7,12 +7,14 @@ use super::draw::{Palette, ScreenModel, columns};
 use super::model::{self, ErrorCauses, Model, NodeSurveys, Sample};
 use super::output::Output;
 use super::terminal::{RawTerminal, keyboard};
+use crate::look::control::supervisor;
 use crate::look::observer::Silence;
 use crate::look::target::Running;
 use crate::terminal::Failure;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyEventKind};
 use rohrpost::Name;
+use rohrpost::interfaces::ControlState;
 use rohrpost::schema::Description;
 use rohrpost_launch::survey::Standing;
 use rohrpost_launch::{Event as LaunchEvent, events};
@@ -72,6 +74,8 @@ struct Live {
     output: Output,
     /// Why modules are in error, as they reported.
     said: ErrorCauses,
+    /// What a supervisor told last, for its page.
+    control: Option<(Name, ControlState)>,
 }
 
 impl Live {
@@ -95,6 +99,7 @@ impl Live {
             calls: None,
             output,
             said: ErrorCauses::default(),
+            control: None,
         };
         live.join();
         Ok(live)
@@ -212,6 +217,11 @@ impl Live {
         for name in self.now.unexplained() {
             answers.extend(calls.why(&self.running, name));
         }
+        if let Screen::Details(name) = self.app.screen
+            && let Some(supervisor) = supervisor(&self.running, name)
+        {
+            answers.extend(calls.control(&self.running, supervisor));
+        }
         answers.into_iter().for_each(|answer| self.answer(answer));
     }
 
@@ -251,6 +261,7 @@ impl Live {
                     self.ask();
                 }
             }
+            Answer::Control(name, state) => self.control = Some((name, state)),
             Answer::Why(name, error) => {
                 self.said.insert(name, error);
                 self.peek();
@@ -298,14 +309,16 @@ impl Live {
     fn draw(&mut self, terminal: &mut DefaultTerminal) -> Result<(), Failure> {
         let details = match self.app.screen {
             Screen::Details(name) => {
-                let Self { running, described, now, model, .. } = self;
+                let Self { running, described, now, model, control, .. } = self;
                 let describe = |alias| match running.is_own(alias) {
                     true => running.describe(alias).ok(),
                     // Asked once, and not if the call would only time out.
                     false if now.is_silent(name) => None,
                     false => described.entry(alias).or_insert_with(|| running.describe(alias).ok()).clone(),
                 };
-                details::page(&running.installation, now, model, name, describe)
+                let shown = supervisor(running, name);
+                let control = control.as_ref().filter(|(of, _)| shown == Some(*of)).map(|(_, state)| state);
+                details::page(&running.installation, now, model, name, (control, describe))
             }
             Screen::Table | Screen::Help => Vec::new(),
         };

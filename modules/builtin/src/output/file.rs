@@ -27,7 +27,7 @@ pub(super) struct LogFile {
 struct Open {
     file: File,
     len: u64,
-    /// Its last line has no end: its writer was killed, or the disk was full.
+    /// Whether the last line has no end: its writer was killed, or the disk was full.
     torn: bool,
 }
 

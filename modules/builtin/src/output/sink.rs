@@ -11,7 +11,7 @@ const RETRY: Duration = Duration::from_secs(1);
 pub(super) enum SinkChange {
     /// From now on lines are missing there.
     Fails(io::Error),
-    /// It works again; so many lines are missing.
+    /// The sink works again; so many lines are missing.
     Works(u64),
 }
 

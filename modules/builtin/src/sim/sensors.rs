@@ -21,7 +21,7 @@ pub(super) struct Sensors {
 }
 
 impl Sensors {
-    /// Those for which the module has a name.
+    /// The sensors for which the module has a name.
     pub(super) fn new(context: &Context, camera_rate_hz: f64, depth_rate_hz: f64) -> Self {
         let (installation, me) = (context.installation(), context.me());
         let module = installation.module(me);

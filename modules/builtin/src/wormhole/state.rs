@@ -3,7 +3,7 @@
 use rohrpost_config::ClassTable;
 use rohrpost_mailbox::Name;
 use rohrpost_modules::call::CallError;
-use rohrpost_modules::interfaces::{CauseCount, ControlDriver, ControlMode, ControlState};
+use rohrpost_modules::interfaces::{CauseCount, ControlDriver, ControlMode, ControlState, HeldHalt};
 use rohrpost_supervision::{Capped, Driver, Mode, Refusal, Verdict, Why, Wormhole};
 
 /// What was counted, and what was told last.
@@ -18,6 +18,7 @@ pub(super) struct Told {
     capped: [u64; Why::ALL.len()],
     refused: [u64; Why::ALL.len()],
     motor: Option<String>,
+    drives_itself: bool,
     last: ControlState,
 }
 
@@ -34,6 +35,7 @@ impl Told {
             capped: Default::default(),
             refused: Default::default(),
             motor: None,
+            drives_itself: false,
             last: ControlState::default(),
         }
     }
@@ -61,6 +63,16 @@ impl Told {
         tracing::warn!("the driver has lost control; the robot brakes");
     }
 
+    /// Whether the wormhole itself drives, told once.
+    pub(super) fn drives_itself(&mut self, drives_itself: bool) {
+        match (self.drives_itself, drives_itself) {
+            (false, true) => tracing::warn!("drives to the program's last destination"),
+            (true, false) => tracing::info!("drives no further itself"),
+            _ => {}
+        }
+        self.drives_itself = drives_itself;
+    }
+
     /// Whether commands go out to the motor, told once.
     pub(super) fn motor(&mut self, trouble: Option<String>) {
         if trouble != self.motor {
@@ -86,18 +98,13 @@ impl Told {
         self.classes.format(name)
     }
 
-    /// Modules that hold the robot, each once.
-    pub(super) fn halted_by(&self, wormhole: &Wormhole) -> Vec<String> {
-        let mut names: Vec<String> = wormhole.halts.held().map(|halt| self.name(Name::from_raw(halt.by))).collect();
-        names.sort();
-        names.dedup();
-        if wormhole.halts.has_unnamed() {
-            names.push("more callers than have names here".into());
-        }
-        names
-    }
-
-    pub(super) fn state(&self, wormhole: &Wormhole, sees: bool) -> ControlState {
+    pub(super) fn state(
+        &self,
+        wormhole: &Wormhole,
+        driven_by: String,
+        halts: Vec<HeldHalt>,
+        sees: bool,
+    ) -> ControlState {
         let refusals = counted(&self.refusals, &Refusal::ALL, "promise refused");
         let capped = counted(&self.capped, &Why::ALL, "command capped");
         let refused = counted(&self.refused, &Why::ALL, "command refused");
@@ -112,8 +119,11 @@ impl Told {
                 Driver::Program => ControlDriver::Program,
                 Driver::Person => ControlDriver::Person,
             },
+            driven_by,
             sees,
-            halted_by: self.halted_by(wormhole),
+            halts,
+            held_unnamed: wormhole.halts.has_unnamed(),
+            drives_itself: self.drives_itself,
             failures: wormhole.failures(),
             restarts: self.restarts,
             gained: self.gained,
@@ -124,9 +134,12 @@ impl Told {
         }
     }
 
-    /// Whether mode, driver, sight or halts are others than last time; then this is the last time.
+    /// Whether what is published is another than last time; then this is the last time.
     pub(super) fn is_news(&mut self, state: &ControlState) -> bool {
-        let of = |state: &ControlState| (state.mode, state.driver, state.sees, state.halted_by.clone());
+        let of = |state: &ControlState| {
+            let ControlState { mode, driver, sees, ref halts, held_unnamed, drives_itself, .. } = *state;
+            (mode, driver, sees, halts.clone(), held_unnamed, drives_itself)
+        };
         let is_news = of(&self.last) != of(state);
         if is_news {
             self.last = state.clone();
@@ -141,8 +154,16 @@ pub(super) fn complaint(state: &ControlState) -> String {
         ControlState { mode: ControlMode::Failed, .. } => {
             "the program failed too often; the robot stands until somebody calls `reset`".into()
         }
-        ControlState { halted_by, .. } if !halted_by.is_empty() => format!("halted by {}", halted_by.join(", ")),
+        ControlState { halts, held_unnamed, .. } if *held_unnamed || !halts.is_empty() => {
+            let mut holders: Vec<&str> = halts.iter().map(|halt| halt.holder.as_str()).collect();
+            holders.dedup();
+            holders.extend(held_unnamed.then_some("callers without a name here"));
+            format!("halted by {}; `rohrpost resume` lets go", holders.join(", "))
+        }
         ControlState { sees: false, .. } => "the robot does not see, and stands".into(),
+        ControlState { drives_itself: true, .. } => {
+            "the program has lost control; the robot drives on without it".into()
+        }
         _ => String::new(),
     }
 }

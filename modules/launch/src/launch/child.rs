@@ -5,12 +5,13 @@ mod ended;
 mod ending;
 mod heard;
 mod process;
+mod starting;
 mod watchdog;
 
 pub(super) use ending::Then;
 
 use super::health::Health;
-use super::policy::{Policy, STEADY};
+use super::policy::Policy;
 use super::printed::Printed;
 use super::program::Program;
 use super::repeats::Repeats;
@@ -18,10 +19,9 @@ use super::silence::SilenceWatch;
 use crate::launcher::{ChildState, Phase};
 use ending::ChildShutdown;
 use process::ModuleProcess;
-use rohrpost_config::{Installation, Module, Start, Watchdog};
+use rohrpost_config::{Installation, Module, Standby, Start, Watchdog};
 use rohrpost_mailbox::{ModuleState, Name, Node, monotonic_ns};
 use rohrpost_modules::launch_support::Relay;
-use std::io;
 use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
@@ -61,7 +61,7 @@ enum Mailboxes {
 pub(super) struct Child {
     name: Name,
     text: String,
-    /// Its name and its aliases.
+    /// The module's name and its aliases.
     names: Vec<Name>,
     program: Program,
     policy: Policy,
@@ -81,10 +81,10 @@ pub(super) struct Child {
     /// The present process has joined the node as the module, or the last one had.
     has_joined: bool,
     mailboxes: Mailboxes,
-    /// Its process has ended so, then; what it printed last may still come.
+    /// The process has ended so, then; what it printed last may still come.
     over: Option<(ExitStatus, Instant)>,
     ending: Option<ChildShutdown>,
-    /// It was started then, or will be.
+    /// When the process was started, or will be.
     since: Instant,
     /// Processes it has had.
     lives: u32,
@@ -99,6 +99,14 @@ pub(super) struct Child {
     printed: Printed,
     /// Launch ends: nothing is started any more.
     last_incarnation: bool,
+    /// Another node may run the module.
+    stands_by: bool,
+    standby: Standby,
+    /// Without its lease it is killed after this time.
+    off_within: Duration,
+    /// From then on another node may run it, and a timer of the kernel has ended its process, ns of the monotonic
+    /// clock.
+    off_ns: Option<u64>,
 }
 
 impl Child {
@@ -124,7 +132,16 @@ impl Child {
             required: module.required,
             ready_within: module.ready_within,
             stop_within: module.stop_within,
-            phase: if is_missing { Phase::LeftOut } else { Phase::Waiting },
+            phase: match (is_missing, module.has_standby()) {
+                (true, _) => Phase::LeftOut,
+                (false, true) => Phase::StandsBy,
+                (false, false) => Phase::Waiting,
+            },
+            stands_by: module.has_standby(),
+            standby: module.standby,
+            // A bit less than the lease grants it.
+            off_within: installation.lease_times().off * 4 / 5,
+            off_ns: None,
             process: None,
             has_joined: false,
             mailboxes: Mailboxes::None,
@@ -178,7 +195,7 @@ impl Child {
         &self.last_end
     }
 
-    /// Its process, while there is one.
+    /// The module's process, while there is one.
     pub(super) fn pid(&self) -> Option<u32> {
         self.process.as_ref().map(ModuleProcess::pid)
     }
@@ -197,7 +214,7 @@ impl Child {
         self.turn_on
     }
 
-    /// It has been switched on, or is not meant to be; or it could not be switched on.
+    /// The module has been switched on, or is not meant to be; or it could not be switched on.
     pub(super) fn runs(&mut self, as_meant: bool) {
         self.phase = Phase::Running;
         self.was_on |= as_meant && self.turn_on;
@@ -240,42 +257,9 @@ impl Child {
                 let busy = self.health.look_at().saturating_duration_since(now);
                 Some(self.watchdog_looks_in().map_or(busy, |hang| hang.min(busy)))
             }
-            Phase::Waiting if !self.last_incarnation => Some(self.since.saturating_duration_since(now)),
+            Phase::Waiting | Phase::StandsBy if self.may_be_due() => Some(self.since.saturating_duration_since(now)),
             _ => None,
         }
-    }
-
-    /// Starts the process; what there is to say if that fails. That is an end without success: the program may be
-    /// replaced just now, or the computer be short of something for moments.
-    pub(super) fn spawn(&mut self, node: &Node, now: Instant) -> Option<String> {
-        match self.try_spawn(node, now) {
-            Ok(process) => {
-                (self.process, self.has_joined) = (Some(process), false);
-                self.phase = Phase::Starting;
-                self.since = now;
-                self.was_on = false;
-                self.mailboxes = Mailboxes::Used;
-                self.lives += 1;
-                None
-            }
-            Err(error) => {
-                let how = format!("could not be started: {}: {error}", self.program.path().display());
-                let next = self.policy.ended(false, now);
-                let errno = error.raw_os_error().and_then(|number| u16::try_from(number).ok());
-                self.follow(next, &ProcessEnd { is_success: false, how: &how, errno, printed: "" }, now)
-            }
-        }
-    }
-
-    fn try_spawn(&mut self, node: &Node, now: Instant) -> io::Result<ModuleProcess> {
-        // First: if nobody reads what it prints, a process is stuck as soon as the pipe is full.
-        let quiet = self.repeats.is_quiet().then_some(STEADY);
-        let pipes = self.printed.begin(quiet.map(|quiet| now + quiet))?;
-        // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes
-        // before any word of launch's: so it switches itself on. At the first start launch does, when all are ready.
-        let before = node.next_incarnation();
-        let started = self.program.spawn(self.lives > 0 && self.turn_on, self.restarts, quiet, pipes)?;
-        Ok(ModuleProcess::new(self.name, started, before))
     }
 
     /// Looks after it; what there is to say.
@@ -316,6 +300,7 @@ impl Child {
                 return Some(format!("{} was not ready within {within:?}; killed", self.text));
             }
             Phase::Waiting if self.may_spawn(now) => return self.spawn(node, now),
+            Phase::StandsBy if self.wants_standby() && self.may_spawn(now) => return self.spawn(node, now),
             Phase::Stopping => return self.press(node, now),
             Phase::Ready | Phase::Running => {
                 let note = self.end_if_it_hangs(node, now);
@@ -329,10 +314,6 @@ impl Child {
     /// What went wrong with it, and what it is stuck in.
     pub(super) fn health(&mut self) -> &mut Health {
         &mut self.health
-    }
-
-    fn may_spawn(&self, now: Instant) -> bool {
-        self.process.is_none() && now >= self.since && !self.last_incarnation && !self.has_left_mailboxes()
     }
 
     /// Notes whether somebody has switched it on or off.
@@ -349,8 +330,8 @@ impl Child {
         }
     }
 
-    /// It is not started again unless somebody asks for it, and then finds empty mailboxes: what was meant for this run
-    /// must not drive that one.
+    /// The module is not started again unless somebody asks for it, and then finds empty mailboxes: what was meant
+    /// for this run must not drive that one.
     fn rest(&mut self, phase: Phase) {
         self.phase = phase;
         if self.mailboxes == Mailboxes::Used {
@@ -363,7 +344,7 @@ impl Child {
         self.mailboxes == Mailboxes::Left
     }
 
-    /// They are.
+    /// Told when the mailboxes are gone.
     pub(super) fn mailboxes_are_gone(&mut self) {
         self.mailboxes = Mailboxes::None;
     }
@@ -374,8 +355,9 @@ impl Child {
     }
 }
 
+/// One that stands by has no mailboxes that could be found.
 fn is_ready(state: ModuleState) -> bool {
-    !matches!(state, ModuleState::Starting | ModuleState::Stopping)
+    !matches!(state, ModuleState::Starting | ModuleState::Stopping | ModuleState::StandsBy)
 }
 
 /// As much of a text as tools are told.

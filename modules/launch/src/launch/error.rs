@@ -2,6 +2,7 @@
 
 use rohrpost_mailbox::{NodeError, ProcessError};
 use rohrpost_modules::runtime::ClientError;
+use rohrpost_supervision::lease::BadTerms;
 
 /// Why a node could not be launched.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +19,9 @@ pub enum LaunchError {
     /// Launch's own mailboxes.
     #[error(transparent)]
     Client(#[from] ClientError),
+    /// Leases of modules with several nodes.
+    #[error(transparent)]
+    Lease(#[from] LeaseError),
     /// Signals.
     #[error("signal handlers: {0}")]
     Signals(std::io::Error),
@@ -47,12 +51,31 @@ pub enum LaunchError {
         /// What else there is to say: of its earlier tries, of the others, and of their end.
         notes: Vec<String>,
     },
+    /// Told to stop before all modules were on.
+    #[error("module {module} did not become ready: told to stop{}", below(notes))]
+    Stopped {
+        /// The module that it waited for.
+        module: String,
+        /// As in [`NotReady`](Self::NotReady).
+        notes: Vec<String>,
+    },
+}
+
+/// Why launch can take no part in leases.
+#[derive(Debug, thiserror::Error)]
+pub enum LeaseError {
+    /// No timer.
+    #[error("a timer for the lease of a module with several nodes: {0}")]
+    Timer(#[from] std::io::Error),
+    /// Times that do not fit together, which configuration refuses.
+    #[error(transparent)]
+    Terms(#[from] BadTerms),
 }
 
 /// Why launch leaves a process alone that has the name of one of its modules.
 #[derive(Debug, thiserror::Error)]
 pub enum NotStarted {
-    /// It is not known which process it is.
+    /// Nobody knows which process it is.
     #[error("{0}; end it where it runs, or launch under another ROHRPOST_DIR, or another `installation`")]
     Unknown(ProcessError),
     /// Somebody has started it.
@@ -66,12 +89,16 @@ fn below(notes: &[String]) -> String {
 }
 
 impl LaunchError {
-    /// The same, with what else is to be told of a start that failed.
+    /// This error, with what else is to be told of a start that failed.
     pub(super) fn with(mut self, told: Vec<String>) -> Self {
-        if let Self::NotReady { module, why, notes } = &mut self {
-            // Its last end is the error.
-            let same = format!("{module} {why}");
-            notes.extend(told.into_iter().filter(|note| *note != same));
+        match &mut self {
+            Self::NotReady { module, why, notes } => {
+                // Its last end is the error.
+                let same = format!("{module} {why}");
+                notes.extend(told.into_iter().filter(|note| *note != same));
+            }
+            Self::Stopped { notes, .. } => notes.extend(told),
+            _ => {}
         }
         self
     }

@@ -37,6 +37,18 @@ pub fn events() -> Result<Receiver<Event>, LaunchError> {
     Ok(receiver)
 }
 
+/// A flag that is raised by each signal to stop from now on, also while nobody hears [`events`].
+///
+/// # Errors
+/// [`LaunchError::Signals`].
+pub fn stop_flag() -> Result<Arc<AtomicBool>, LaunchError> {
+    let flag = Arc::new(AtomicBool::new(false));
+    for signal in stop_signals() {
+        signal_hook::flag::register(signal, flag.clone()).map_err(LaunchError::Signals)?;
+    }
+    Ok(flag)
+}
+
 /// Events, turned into rings of the bell that launch sleeps on.
 pub(super) struct Bell {
     heard: Arc<Heard>,

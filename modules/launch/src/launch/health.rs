@@ -5,7 +5,7 @@ use crate::survey::Working;
 use rohrpost_mailbox::{InHand, Name, Node, monotonic_ns};
 use std::time::{Duration, Instant};
 
-/// It is looked no more often than this whether a part of a module's code has come back.
+/// Shortest time between two looks whether a part of a module's code has come back.
 const LOOK_MIN: Duration = Duration::from_millis(50);
 
 /// How a module does, while it runs.
@@ -80,7 +80,7 @@ impl Health {
         }
     }
 
-    /// Its process has ended; if it failed, so.
+    /// The module's process has ended; if it failed, so.
     pub(super) fn ended(&mut self, failure: Option<&String>) {
         self.present = None;
         self.end_complaint();

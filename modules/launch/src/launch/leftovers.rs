@@ -70,8 +70,8 @@ impl Leftovers<'_> {
         self.node.participants().into_iter().filter(|it| named(it.module) && !is_own(it)).collect()
     }
 
-    /// Their processes, by their modules' names. Until `deadline` it waits for those that it may not end: the last
-    /// launch has died a moment ago, perhaps, and they are about to.
+    /// Processes that are left, by their modules' names. Until `deadline` it waits for those that it may not end: the
+    /// last launch has died a moment ago, perhaps, and they are about to.
     fn identify(&self, deadline: Instant) -> Result<Vec<(String, ParticipantProcess)>, LaunchError> {
         loop {
             let processes: Result<Vec<_>, _> = self.living().iter().filter_map(|it| self.process_of(it)).collect();

@@ -11,16 +11,16 @@
 //! ```
 //!
 //! One thread turns round and round: it looks after each module, moves the calls on that switch modules on, and answers
-//! tools (`serve`). Nothing in it waits for a module. It sleeps on launch's mailboxes; signals ring the same bell.
-//!
-//! If launch dies, the kernel tells each module (`rohrpost_modules::runtime`), which goes to its safe state and ends;
-//! one that cannot is ended by the next launch.
+//! tools (`serve`). Nothing in it waits for a module. It sleeps on launch's mailboxes; signals ring the same bell. If
+//! launch dies, the kernel tells each module (`rohrpost_modules::runtime`), which goes to its safe state and ends; one
+//! that cannot is ended by the next launch.
 
 mod child;
 mod end;
 mod error;
 mod events;
 mod health;
+mod leases;
 mod leftovers;
 mod look;
 mod orphans;
@@ -31,18 +31,21 @@ mod repeats;
 mod serve;
 mod silence;
 mod start;
+mod take;
 mod time;
 
-pub use error::{LaunchError, NotStarted};
-pub use events::{Event, events};
+pub use error::{LaunchError, LeaseError, NotStarted};
+pub use events::{Event, events, stop_flag};
 pub use leftovers::CONFIG_FILE;
 pub use orphans::reap_orphans;
+pub use program::Permit;
 
 use crate::launcher::{Known, Phase};
 use crate::survey::Survey;
 use child::Child;
 use end::LaunchShutdown;
 use events::Bell;
+use leases::Leases;
 use look::Looks;
 use program::Program;
 use rohrpost_config::{Installation, Module, Node as NodeConfig};
@@ -52,13 +55,13 @@ use rohrpost_modules::launch_support::{OutputProxy, Relay};
 use rohrpost_modules::runtime::{ClientError, ToolLink};
 use serve::{Counter, Orders};
 use start::UnderWay;
-use std::io::ErrorKind;
 use std::ops::Range;
 use std::os::fd::OwnedFd;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
+use take::take_node;
 use time::NodeTime;
 
 /// Modules answer launch within this time.
@@ -73,9 +76,6 @@ const LOOK_CLOCK: Duration = Duration::from_secs(1);
 const LET_GO: Duration = Duration::from_secs(1);
 /// Notes that are kept for queries; the oldest go first.
 const NOTES_MAX: usize = 1000;
-
-/// A node that somebody else removes just now is taken at the next try, or the next but one.
-const TAKE_MAX: usize = 20;
 
 /// A node that is launched. The thread that begins it must live as long as its modules: the kernel takes that thread's
 /// end for launch's, and tells them so.
@@ -95,6 +95,8 @@ pub struct Launch {
     bell: Bell,
     lock: LaunchLock,
     time: NodeTime,
+    /// Of modules with several nodes.
+    leases: Leases,
     /// What it says itself, in order with what it passes on of its modules.
     output: Option<OutputProxy>,
     /// Events to show, oldest first.
@@ -137,11 +139,13 @@ impl Launch {
         events: Receiver<Event>,
         resolved: &[u8],
     ) -> Result<Self, LaunchError> {
-        Self::begin_keeping(installation, node_name, executable, events, resolved, |_| Vec::new())
+        let permit: Permit = Arc::new(|_| Ok(()));
+        Self::begin_keeping(installation, node_name, executable, events, resolved, |_| Vec::new(), &permit)
     }
 
-    /// The same, and it keeps what `keep` gives for a module: sockets, say. Each process of that module has them
-    /// ([`kept`](rohrpost_modules::runtime::kept)), so what waits in them outlives it.
+    /// Starts as above, and keeps what `keep` gives for a module: sockets, say. Each process of that module has them
+    /// ([`kept`](rohrpost_modules::runtime::kept)), so what waits in them outlives it. Each start
+    /// of a program is permitted by `permit`.
     ///
     /// # Errors
     /// As for [`Launch::begin`].
@@ -152,7 +156,9 @@ impl Launch {
         events: Receiver<Event>,
         resolved: &[u8],
         keep: impl Fn(&Module) -> Vec<OwnedFd>,
+        permit: &Permit,
     ) -> Result<Self, LaunchError> {
+        let installation = Arc::new(Arc::unwrap_or_clone(installation).seen_from(node_name));
         let usual_nice = program::hurry();
         let beside = executable.parent().map(PathBuf::from).unwrap_or_default();
         let missing = installation.missing_programs(node_name, &beside);
@@ -167,17 +173,18 @@ impl Launch {
         let time = NodeTime::begin(&node, &installation, node_name)?;
         leftovers::note_config(&node, &installation, node_name, resolved)?;
         let tool = ToolLink::join_as_launch(&installation, &node, node_name, PATIENCE)?;
+        let leases = Leases::begin(&installation, &node, node_name)?;
         let counter = Counter::open(&tool.link, &installation).map_err(ClientError::from)?;
         let bell = Bell::listen(events, tool.link.participant())?;
         let relay = Relay::new(tool.link.participant(), tool.link.me());
-        let children: Vec<Child> = installation
-            .modules_on(node_name)
-            .map(|module| {
-                let program = Program::new(module, &installation, &executable, keep(module), usual_nice);
-                let is_missing = missing.iter().any(|missing| missing.module == module.name);
-                Child::new(module, &installation, program, &relay, is_missing)
-            })
-            .collect();
+        let mut children = Vec::new();
+        for module in installation.modules_on(node_name) {
+            let mut kept = keep(module);
+            kept.extend(leases.kept_for(module.name).map_err(LeaseError::from)?);
+            let program = Program::new(module, &installation, &executable, kept, usual_nice, permit);
+            let is_missing = missing.iter().any(|missing| missing.module == module.name);
+            children.push(Child::new(module, &installation, program, &relay, is_missing));
+        }
         let output = relay.voice(&installation, tool.link.me());
         // It holds launch's place on the node, which is to be given back if the start fails.
         drop(relay);
@@ -197,6 +204,7 @@ impl Launch {
             bell,
             lock,
             time,
+            leases,
             output,
             notes,
         };
@@ -204,6 +212,12 @@ impl Launch {
             Ok(()) => Ok(launch),
             Err(error) => Err(error.with(launch.stop())),
         }
+    }
+
+    /// Moves the leases on.
+    fn step_leases(&mut self) {
+        let note = self.leases.step(&mut self.children, &mut self.tool, &self.node, Instant::now());
+        self.note(note);
     }
 
     /// Moves one module on.
@@ -224,7 +238,8 @@ impl Launch {
         self.known.write(&self.node, self.children.iter().map(|child| child.state(now)).collect());
         let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
         let (looks, notes, time) = (&mut self.looks, &mut self.notes, &mut self.time);
-        let orders = Orders { children, installation, node, node_name: &self.node_name, looks, notes, time, ending };
+        let (leases, node_name) = (&mut self.leases, &*self.node_name);
+        let orders = Orders { children, installation, node, node_name, looks, notes, time, leases, ending };
         self.counter.serve(orders, &mut self.tool.link);
     }
 
@@ -267,7 +282,7 @@ impl Launch {
         let now = Instant::now();
         let looks = self.children[children].iter().filter_map(|child| child.look_again(now));
         let switching = self.calls.iter().any(|calls| calls.switch.is_some()).then_some(LOOK_SWITCHING);
-        let period = looks.chain(switching).fold(period, Duration::min);
+        let period = looks.chain(switching).chain(self.leases.due_in()).fold(period, Duration::min);
         let mailboxes = &mut [self.counter.commands(), self.tool.link.replies()];
         wait_any(mailboxes, now.checked_add(period), || self.bell.was_rung());
     }
@@ -275,6 +290,8 @@ impl Launch {
     /// Watches for at most `period`, or until something happens; false when it is time to stop.
     pub fn watch(&mut self, period: Duration) -> bool {
         self.sleep(0..self.children.len(), period.min(LOOK_CLOCK));
+        // First: what runs without its lease after a long sleep must not be started again.
+        self.step_leases();
         for index in 0..self.children.len() {
             self.step(index);
             self.switch_on(index);
@@ -297,6 +314,11 @@ impl Launch {
             _ => child.present_error(&self.node),
         };
         self.children.iter().filter_map(failure).collect()
+    }
+
+    /// Modules that are in error, or are meant to be on and are not: what each is.
+    pub fn not_on(&self) -> impl Iterator<Item = String> {
+        self.children.iter().filter_map(|child| child.not_on(&self.node))
     }
 
     /// Where launch stands with a module.
@@ -339,6 +361,8 @@ impl Launch {
     pub fn stop(mut self) -> Vec<String> {
         let mut ending = LaunchShutdown::begin(&mut self.children, self.bell.words(), Instant::now());
         loop {
+            // A module keeps its lease until it is off, and then gives it back.
+            self.step_leases();
             let now = Instant::now();
             for child in &mut self.children {
                 self.notes.extend(child.step(&self.node, now));
@@ -372,29 +396,5 @@ impl Launch {
             Err(error) => notes.push(error.to_string()),
         }
         notes
-    }
-}
-
-/// Makes a node and becomes its launch.
-fn take_node(path: &Path, mode: u32) -> Result<(Arc<Node>, LaunchLock), NodeError> {
-    let mut tries = 0;
-    loop {
-        match Node::create(path, mode).and_then(|node| Ok((node.launch_lock()?, node))) {
-            Ok((lock, node)) => return Ok((node, lock)),
-            Err(error) if tries == TAKE_MAX || !passes(&error) => return Err(error),
-            Err(_) => {}
-        }
-        tries += 1;
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
-/// Whether an earlier launch that ends just now, or `rohrpost clean`, may be the reason: they keep all others out while
-/// they remove a node, which takes a moment.
-fn passes(error: &NodeError) -> bool {
-    match error {
-        NodeError::Missing(_) | NodeError::Launched(..) => true,
-        NodeError::Io(_, error) => error.kind() == ErrorKind::NotFound,
-        _ => false,
     }
 }

@@ -16,9 +16,9 @@ pub(super) const STEADY: Duration = Duration::from_secs(10);
 pub(super) enum Next {
     /// Started again after this pause.
     Again(Duration),
-    /// It stays ended.
+    /// The module stays ended.
     Stay,
-    /// It would be started again, had it not ended too often already.
+    /// The module would be started again, had it not ended too often already.
     GivenUp,
 }
 

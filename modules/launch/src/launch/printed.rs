@@ -149,13 +149,13 @@ impl Printed {
         due_at.into_iter().chain(self.voice.as_ref()?.retry_at()).min()
     }
 
-    /// Its process has ended, and launch has told the like before: what it printed while nothing was to be passed on is
+    /// The process has ended, and launch has told the like before: what it printed while nothing was to be passed on is
     /// not said.
     pub(super) fn drop_quiet(&mut self, now: Instant) {
         lock(&self.lines).drop_quiet(now);
     }
 
-    /// Its process has ended: passes on what is held. If it failed, what came by standard error were its last words.
+    /// The process has ended: passes on what is held. If it failed, what came by standard error were its last words.
     pub(super) fn pass_on(&mut self, failed: bool) {
         let Some(voice) = &self.voice else { return };
         let held = std::mem::take(&mut lock(&self.lines).held);

@@ -8,7 +8,11 @@ use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
 use std::time::Duration;
+
+/// Asked before each start of a program, with its path: an error keeps it from being started.
+pub type Permit = Arc<dyn Fn(&Path) -> io::Result<()> + Send + Sync>;
 
 /// Where launch has the right to it, it goes before ordinary programs by so much: on a busy computer a router that died
 /// is to be there again before calls that wait for it run out of time.
@@ -36,12 +40,16 @@ pub(super) struct Program {
     arguments: Vec<String>,
     /// The configuration's file.
     config: PathBuf,
-    /// The module's name.
+    /// The module's name, and its node.
     module: String,
+    node: String,
+    /// The last of `kept` tell the process that its lease begins, and ends.
+    is_leased: bool,
     /// What all its processes have, one after the other.
     kept: Vec<OwnedFd>,
     /// What it begins with, if launch goes before ordinary programs and it is not real time.
     nice: Option<i8>,
+    permit: Permit,
 }
 
 impl Program {
@@ -53,6 +61,7 @@ impl Program {
         executable: &Path,
         kept: Vec<OwnedFd>,
         usual_nice: Option<i8>,
+        permit: &Permit,
     ) -> Self {
         let beside = executable.parent().unwrap_or(Path::new(".")).to_owned();
         let (path, arguments) = match &module.program {
@@ -65,7 +74,9 @@ impl Program {
         let config = installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone());
         let is_real_time = matches!(installation.scheduling(module.name.class()), Scheduling::Fifo { .. });
         let nice = usual_nice.filter(|_| !is_real_time);
-        Self { path, beside, arguments, config, module: installation.classes.format(module.name), kept, nice }
+        let (node, is_leased) = (module.node.clone(), module.has_standby());
+        let (module, permit) = (installation.classes.format(module.name), permit.clone());
+        Self { path, beside, arguments, config, module, node, is_leased, kept, nice, permit }
     }
 
     /// Looks again for a program that was missing.
@@ -92,6 +103,7 @@ impl Program {
         quiet: Option<Duration>,
         [stdout, stderr]: [PipeWriter; 2],
     ) -> io::Result<Child> {
+        (self.permit)(&self.path)?;
         let mut command = Command::new(&self.path);
         match quiet {
             Some(quiet) => command.env(environment::QUIET_MS, quiet.as_millis().to_string()),
@@ -100,6 +112,10 @@ impl Program {
         if !on {
             command.env(environment::OFF, "1");
         }
+        match self.is_leased {
+            true => command.env(environment::LEASE, "1"),
+            false => command.env_remove(environment::LEASE),
+        };
         match self.kept.is_empty() {
             true => sys::hand_nothing_on(&mut command),
             false => sys::hand_on(&mut command, &self.kept)?,
@@ -113,6 +129,7 @@ impl Program {
             .stdin(Stdio::null())
             .env(environment::CONFIG, &self.config)
             .env(environment::MODULE, &self.module)
+            .env(environment::NODE, &self.node)
             .env(environment::LAUNCHER, std::process::id().to_string())
             .env(environment::RESTARTS, restarts.to_string())
             .stdout(stdout)

@@ -36,7 +36,7 @@ pub(super) struct Repeats {
 }
 
 impl Repeats {
-    /// It has ended for so many times in a row, and is started again.
+    /// The module has ended for so many times in a row, and is started again.
     pub(super) fn ended(&mut self, in_a_row: u32, cause: &str, now: Instant) -> Tell {
         let cause = comparable(cause);
         let passed = self.told_at.map_or(Duration::MAX, |at| now.saturating_duration_since(at));
@@ -57,7 +57,7 @@ impl Repeats {
         tell
     }
 
-    /// It has ended, and is not started again.
+    /// The module has ended, and is not started again.
     pub(super) fn is_over(&mut self) -> Tell {
         Tell::Whole(std::mem::take(self).untold)
     }

@@ -1,10 +1,11 @@
 //! Launch as the senders of commands see it.
 
 use super::child::{Child, Then};
+use super::leases::Leases;
 use super::look::{Looks, see};
 use super::time::NodeTime;
 use crate::launcher::{Children, ControlError, Launcher, LauncherInterface, Phase};
-use crate::launcher::{LookError, LookPage, SnapshotRequest};
+use crate::launcher::{LeaseMessage, LookError, LookPage, SnapshotRequest};
 use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{CreateError, Head, Label, Name, Node, Receiver, SendError, Shape};
 use rohrpost_modules::call::{Fault, Link};
@@ -12,7 +13,7 @@ use rohrpost_modules::common;
 use rohrpost_modules::interface::{Interface, Serve};
 use rohrpost_modules::launch_support::{Cause, Command, CommandHandler, CommandServer, Refusals, admit};
 use rohrpost_schema::Description;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Commands taken in one go: a flood of them must not keep launch from its modules.
 const BURST: usize = 32;
@@ -74,6 +75,7 @@ pub(super) struct Orders<'a> {
     pub(super) notes: &'a mut Vec<String>,
     /// System time of the node.
     pub(super) time: &'a mut NodeTime,
+    pub(super) leases: &'a mut Leases,
     /// Launch stops all.
     pub(super) ending: bool,
 }
@@ -198,9 +200,13 @@ impl Launcher for Orders<'_> {
         Ok(epoch)
     }
 
-    fn end_failing(&mut self, module: String, cause: String, ran_for_ms: u32) -> Result<bool, ControlError> {
-        let (node, ran_for) = (self.node, Duration::from_millis(ran_for_ms.into()));
-        Ok(self.find(&module)?.end_failing(&cause, ran_for, node, Instant::now()))
+    fn end_failing(&mut self, module: String, cause: String, incarnation: u32) -> Result<bool, ControlError> {
+        let node = self.node;
+        Ok(self.find(&module)?.end_failing(&cause, incarnation, node, Instant::now()))
+    }
+
+    fn lease(&mut self, asks: LeaseMessage) -> LeaseMessage {
+        self.leases.answer(&asks, self.node)
     }
 
     fn look_on(&mut self, look: u32, from: u32, bytes_max: u16) -> Result<LookPage, LookError> {

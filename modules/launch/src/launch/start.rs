@@ -67,7 +67,9 @@ impl Launch {
         loop {
             let child = &self.children[index];
             match child.phase() {
-                Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended | Phase::LeftOut => return Ok(true),
+                Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended | Phase::LeftOut | Phase::StandsBy => {
+                    return Ok(true);
+                }
                 Phase::Failed if child.is_required() => return Err(not_ready(child, child.last_end())),
                 Phase::Failed => return Ok(false),
                 _ if self.never_ready(child) => return Err(not_ready(child, child.last_end())),
@@ -145,9 +147,11 @@ impl Launch {
     fn turn(&mut self, started: Range<usize>, index: usize) -> Result<(), LaunchError> {
         self.sleep(started.clone(), Duration::MAX);
         if self.bell.words() > 0 {
-            return Err(not_ready(&self.children[index], "told to stop"));
+            let module = self.children[index].text().into();
+            return Err(LaunchError::Stopped { module, notes: Vec::new() });
         }
         // Those that were started before may end meanwhile.
+        self.step_leases();
         started.for_each(|index| self.step(index));
         self.serve(false);
         Ok(())

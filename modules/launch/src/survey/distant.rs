@@ -21,10 +21,10 @@ const PAGE_PATIENCE: Duration = Duration::from_millis(400);
 /// Why a node could not be looked at.
 #[derive(Debug, thiserror::Error)]
 pub enum LookFailure {
-    /// Its launch could not be asked, or said something else.
+    /// The node's launch could not be asked, or said something else.
     #[error(transparent)]
     Call(#[from] CallError),
-    /// Its launch does not show it.
+    /// The node's launch does not show it.
     #[error(transparent)]
     Refused(#[from] LookError),
     /// No whole look came within this time.

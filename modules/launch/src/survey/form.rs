@@ -1,7 +1,7 @@
 //! A look at a node as it travels from that node's launch to a tool elsewhere: postcard of forms of its types.
 //!
-//! Those of `rohrpost-mailbox` know no serialization, so `travels!` makes a form of each, field by field. What arrives
-//! is a claim of another process: whatever the bytes are, reading them gives a look or an error.
+//! The types of `rohrpost-mailbox` know no serialization, so `travels!` makes a form of each, field by field. What
+//! arrives is a claim of another process: whatever the bytes are, reading them gives a look or an error.
 
 #[cfg(test)]
 mod tests;
@@ -229,9 +229,10 @@ travels! {
         bytes_out: u64,
         depth: u32,
         working: Option<Working>,
+        in_turn: Option<Duration>,
         child: Option<ChildState>,
     } without { error: None };
-    // What lasts long is in the module's own form, with the names of functions.
+    // For how long it lasts is in the module's own form; what lasts long is there, too, with the names of functions.
     struct ParticipantInfo as ProcessForm {
         module: Name,
         pid: u32,
@@ -242,7 +243,7 @@ travels! {
         restarts: u32,
         joined_ns: u64,
     } without { in_hand: None };
-    enum ModuleState as StateForm { Starting, Off, On, Error, Stopping, };
+    enum ModuleState as StateForm { Starting, Off, On, Error, Stopping, StandsBy, };
     struct Usage as UsageForm { cpu: Duration, memory_bytes: u64, };
     struct Working as WorkingForm { part: String, lasts: Duration, };
     enum Scheduling as SchedulingForm { Fifo(priority: u8), Normal(nice: i8), };

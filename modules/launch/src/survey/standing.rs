@@ -7,7 +7,7 @@
 use super::ModuleSurvey;
 use crate::launcher::Phase;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Node, Work};
+use rohrpost_mailbox::{ModuleState, Node, Work};
 use rohrpost_modules::common::State;
 use rohrpost_modules::description::noted;
 use rohrpost_modules::launch_support::in_words;
@@ -18,35 +18,37 @@ use std::time::Duration;
 /// How a module stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Standing {
-    /// Its process is there or on its way, and takes no commands yet.
+    /// The module's process is there or on its way, and takes no commands yet.
     Starting,
-    /// It works.
+    /// The module works.
     On,
-    /// It is ready, and switched off.
+    /// The module is ready, and switched off.
     Off,
-    /// It runs, and has stopped working for a reason that it tells.
+    /// The module runs, and has stopped working for a reason that it tells.
     Error,
     /// Part of its own code has not come back for long: it hears nobody.
     Busy,
-    /// It does not run, as it is meant: somebody ended it, it had done its work, or it is left out.
+    /// Another node runs it, and this one is there to take over.
+    StandsBy,
+    /// The module does not run, as it is meant: somebody ended it, it had done its work, or it is left out.
     Stopped,
-    /// It ended, and is not started again by itself.
+    /// The module ended, and is not started again by itself.
     Failed,
-    /// It ended, and is to be started again.
+    /// The module ended, and is to be started again.
     Restarting {
         /// Restarts that count against its policy, the next one included.
         attempt: u32,
         /// At so many it is given up.
         most: u32,
     },
-    /// Its node does not show itself.
+    /// The module's node does not show itself.
     Unreachable,
 }
 
 impl Standing {
     /// All words, those that need a person first.
-    pub const WORDS: [&str; 9] =
-        ["failed", "unreachable", "busy", "error", "restarting", "starting", "stopped", "off", "on"];
+    pub const WORDS: [&str; 10] =
+        ["failed", "unreachable", "busy", "error", "restarting", "starting", "stopped", "standby", "off", "on"];
 
     /// One of [`Standing::WORDS`].
     pub const fn word(self) -> &'static str {
@@ -57,13 +59,14 @@ impl Standing {
             Self::Error => "error",
             Self::Busy => "busy",
             Self::Stopped => "stopped",
+            Self::StandsBy => "standby",
             Self::Failed => "failed",
             Self::Restarting { .. } => "restarting",
             Self::Unreachable => "unreachable",
         }
     }
 
-    /// Its place among [`Standing::WORDS`].
+    /// Index among [`Standing::WORDS`].
     ///
     /// ```
     /// use rohrpost_launch::survey::Standing;
@@ -163,7 +166,7 @@ impl fmt::Display for Working {
 }
 
 impl ModuleSurvey {
-    /// Its name and its aliases.
+    /// The module's name and its aliases.
     pub fn names(&self) -> impl Iterator<Item = rohrpost_mailbox::Name> {
         std::iter::once(self.name).chain(self.aliases.iter().copied())
     }
@@ -174,7 +177,10 @@ impl ModuleSurvey {
             return Standing::Unreachable;
         }
         let Some(process) = &self.process else { return self.without_process() };
-        let state = process.state.map_or(Standing::Starting, |state| State::from(state).into());
+        let state = match process.state {
+            Some(ModuleState::StandsBy) => Standing::StandsBy,
+            state => state.map_or(Standing::Starting, |state| State::from(state).into()),
+        };
         if state.answers() && self.working.is_some() { Standing::Busy } else { state }
     }
 
@@ -186,6 +192,7 @@ impl ModuleSurvey {
                 Standing::Restarting { attempt: child.attempt, most: child.attempts_max }
             }
             Phase::Waiting | Phase::Starting => Standing::Starting,
+            Phase::StandsBy => Standing::StandsBy,
             Phase::Ready | Phase::Running | Phase::Stopping | Phase::Stopped | Phase::Ended | Phase::LeftOut => {
                 Standing::Stopped
             }

@@ -5,7 +5,7 @@ use rohrpost_mailbox::{Node, NodeError, StreamInfo};
 /// A stream at one moment.
 #[derive(Clone, Debug)]
 pub struct StreamSurvey {
-    /// Its node.
+    /// The stream's node.
     pub node: String,
     /// When it was looked at, ns of that node's monotonic clock; so are the times of its records.
     pub at_ns: u64,

@@ -11,8 +11,8 @@ const TICKS_PER_S: u64 = 100;
 pub struct Usage {
     /// Time that its threads ran, those that have ended included; in steps of 10 ms.
     pub cpu: Duration,
-    /// Its share of memory: what is resident of it alone, and of what several processes have, mailboxes above all, its
-    /// part. Where the kernel does not tell that, what is resident.
+    /// The process's share of memory: what is resident of it alone, and its part of what several processes have,
+    /// mailboxes above all. Where the kernel does not tell that, what is resident.
     pub memory_bytes: u64,
 }
 

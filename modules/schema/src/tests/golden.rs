@@ -150,11 +150,11 @@ fn texts_and_ranges_do_not_count_names_and_units_do() {
     assert!(!same(&|_, speed| speed.ty = Type::F64));
 }
 
-/// The bytes of a block of the page: each line begins with pairs of digits, then two spaces and words.
+/// The bytes of a block of the page: each line begins with digits, two a byte, then two spaces and words.
 fn block(name: &str) -> Vec<u8> {
     let text = PAGE.split(&format!("\n```hex {name}\n")).nth(1).unwrap().split("\n```").next().unwrap();
-    let pairs = text.lines().flat_map(|line| line.split("  ").next().unwrap_or_default().split(' '));
-    pairs.map(|pair| u8::from_str_radix(pair, 16).unwrap()).collect()
+    let pairs = text.lines().flat_map(|line| line.split("  ").next().unwrap_or_default().as_bytes().chunks(2));
+    pairs.map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
 }
 
 #[test]

@@ -9,9 +9,10 @@ mod links;
 pub(crate) mod replicas;
 mod slots;
 
+use crate::moving::Moving;
 use clock_watch::{ClockReading, ClockWatch};
 use rohrpost_config::ClockSetPolicy;
-use rohrpost_mailbox::Latency;
+use rohrpost_mailbox::{Latency, Ready};
 use rohrpost_modules::interfaces::{ClockRole, NewEpochError, Router, RouterInterface};
 use rohrpost_modules::runtime::{Context, clock_was_set, kept};
 use rohrpost_modules::{Module, ModuleError, NoSettings};
@@ -35,6 +36,7 @@ pub(crate) struct RouterModule {
     /// Delays of those that come, as they were reported last.
     delays: Vec<Latency>,
     clock_watch: ClockWatch,
+    moving: Moving,
 }
 
 impl RouterModule {
@@ -83,6 +85,7 @@ impl Module for RouterModule {
         if let Some(impair) = impair {
             tracing::warn!("adds network faults, as {} requests: {impair}", impair::ENVIRONMENT);
         }
+        let moving = settings.moving.clone();
         let faults = Arc::new(faults::Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
         let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
@@ -102,12 +105,25 @@ impl Module for RouterModule {
         }
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { shell, replicas, delays: Vec::new(), clock_watch: ClockWatch::new(ClockReading::now()) })
+        let moving = Moving::watch(moving, context)?;
+        let clock_watch = ClockWatch::new(ClockReading::now());
+        Ok(Self { shell, replicas, delays: Vec::new(), clock_watch, moving })
+    }
+
+    fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        self.moving.look(context);
+        Ok(())
+    }
+
+    fn ready(&mut self, context: &mut Context, _: Ready) -> Result<(), ModuleError> {
+        self.moving.ready(context);
+        Ok(())
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         // It cannot work without one of its threads; launch restarts it.
         assert!(self.shell.is_well(), "a thread of the router has ended");
+        self.moving.look(context);
         context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
         if let Some(clock) = self.shell.clock() {
             let state = clock::of(&self.shell, clock);

@@ -3,7 +3,7 @@
 use super::ends::{PERIOD, ReplicaReport, called, certificates, classes, configured, levels, line_parts};
 use crate::router::{faults::Encoded, impairment};
 use rohrpost_config::Reach;
-use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, Name, TimeRecord, monotonic_ns, realtime_ns};
 use rohrpost_modules::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
 use rohrpost_modules::runtime::Context;
 use rohrpost_modules::{Module, ModuleError, NoSettings};
@@ -49,7 +49,11 @@ impl Module for ClientModule {
         };
         let server = tcp.address;
         let others = installation.nodes.iter().filter(|other| !is_beyond && other.name != node_name);
-        let others = others.flat_map(|other| installation.names_registered(&other.name)).collect();
+        let mut others: Vec<_> = others.flat_map(|other| installation.names_registered(&other.name)).collect();
+        if !is_beyond {
+            let whole = |name: Name| (name.with_local(0), name.with_local(u8::MAX));
+            others.extend(installation.moving_names().into_iter().map(whole));
+        }
         // Between nodes on the LAN, the faults apply to the LAN.
         let impair = if is_beyond { impairment()? } else { None };
         if let Some(impair) = impair {
@@ -65,13 +69,15 @@ impl Module for ClientModule {
             name: context.me(),
             server,
             settings,
-            hosts: installation.names_registered(&node_name),
+            hosts: installation.names_reached(&node_name),
+            registers: installation.names_registered(&node_name),
             others,
             beyond: installation.names_beyond(&node_name),
             faults: Arc::new(Encoded::of(installation)),
             seal,
             keeps_time: is_beyond,
             impair,
+            team: installation.team_router_of(&node_name),
             // The TCP router itself has those of its node.
             replicas: if is_beyond { line_parts(installation, &node_name) } else { None },
         })?;

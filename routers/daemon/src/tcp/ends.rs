@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// How often they publish their state.
-pub(super) const PERIOD: Duration = Duration::from_millis(500);
+pub(crate) const PERIOD: Duration = Duration::from_millis(500);
 /// Longest name in a session, bytes.
 pub(super) const NAME_BYTES_MAX: usize = rohrpost_routers::session::frame::NAME_BYTES_MAX;
 
@@ -97,7 +97,7 @@ pub(super) fn short(name: &str) -> String {
 }
 
 /// Each class's counters, in the published form.
-pub(super) fn classes(all: &[Class]) -> Vec<ClassPassed> {
+pub(crate) fn classes(all: &[Class]) -> Vec<ClassPassed> {
     let class = |class: &Class| ClassPassed {
         class: class.priority.0,
         packages: class.packages,

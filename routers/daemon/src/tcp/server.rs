@@ -3,16 +3,18 @@
 use super::ends::{
     PERIOD, ReplicaReport, called, certificates, classes, configured, levels, line_parts, short, streams,
 };
+use crate::moving::Moving;
 use crate::router::faults::Encoded;
 use rohrpost_config::Node;
-use rohrpost_mailbox::{Name, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::{Name, Ready, monotonic_ns, realtime_ns};
 use rohrpost_modules::interfaces::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondStreams, Tcp, TcpInterface,
 };
 use rohrpost_modules::runtime::Context;
 use rohrpost_modules::{Module, ModuleError, NoSettings};
+use rohrpost_routers::moving::MovingNames;
 use rohrpost_routers::session::frame::Range;
-use rohrpost_routers::session::server::{MemberSnapshot, Names, OwnNode, OwnNodes, ServerSettings};
+use rohrpost_routers::session::server::{MemberSnapshot, MovingHosts, Names, OwnNode, OwnNodes, ServerSettings};
 use rohrpost_routers::tcp::{ServerParts, ServerSeal, ServerShell};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -24,6 +26,7 @@ pub(crate) struct ServerModule {
     replicas: ReplicaReport,
     streams: BeyondStreams,
     address: SocketAddr,
+    moving: Moving,
     began_ns: u64,
 }
 
@@ -48,11 +51,18 @@ impl Module for ServerModule {
             let all = names_of(installation.names_on(&node.name));
             OwnNode { name: called(&node.name, installation), names, all, address: node.address }
         };
+        let lan = installation.lan_nodes();
+        let moving = MovingHosts {
+            names: Arc::new(MovingNames::new(installation.moving_names(), lan.len())),
+            clients: lan.iter().filter_map(|node| installation.tcp_client_of(&node.name)).collect(),
+        };
+        let moving_names = moving.names.clone();
         let settings = ServerSettings {
             name: short(&format!("the TCP router of {}", installation.system.name)),
             common: digest.common,
             system: Some((installation.system.id, digest.system)),
             own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
+            moving,
             incarnation: realtime_ns().max(1),
             clients_max: tcp.clients,
             handshakes_max: tcp.clients.max(HANDSHAKES_MIN),
@@ -67,13 +77,25 @@ impl Module for ServerModule {
         let shell = ServerShell::start(ServerParts { address, settings, faults, seal, names, node: &node, replicas })?;
         context.use_computer_clock();
         context.set_period(PERIOD);
+        let moving = Moving::watch(moving_names, context)?;
         let streams = streams(context.installation(), &own);
-        Ok(Self { shell, replicas: report, streams, address, began_ns: monotonic_ns() })
+        Ok(Self { shell, replicas: report, streams, address, moving, began_ns: monotonic_ns() })
+    }
+
+    fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        self.moving.look(context);
+        Ok(())
+    }
+
+    fn ready(&mut self, context: &mut Context, _: Ready) -> Result<(), ModuleError> {
+        self.moving.ready(context);
+        Ok(())
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         // It cannot work without its thread; launch restarts it.
         assert!(self.shell.is_well(), "the thread of the TCP router has ended");
+        self.moving.look(context);
         let seen = self.shell.members();
         context.publish_now(TcpInterface::HOSTS, &hosts(&seen.members))?;
         context.publish_now(TcpInterface::STREAMS, &self.streams)?;

@@ -21,7 +21,7 @@ impl Server {
         let published_ns = if carried.published_ns == 0 { now_ns } else { carried.published_ns.min(now_ns) };
         let hops = carried.hops.saturating_add(1);
         let carried = Carried { head, published_ns, hops, ..*carried };
-        let hosts = self.table.client_of(head.from) == Some(from);
+        let hosts = self.host_of(head.from) == Some(from);
         let is_own = hosts || self.is_to_host(from, head.from);
         let objection = if !is_own {
             Some(Cause::Foreign)
@@ -39,7 +39,7 @@ impl Server {
 
     fn carry_to_one(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl ServerHost) {
         // What a client cannot deliver itself does not come back to it.
-        let to = self.table.client_of(carried.head.to).filter(|to| *to != from);
+        let to = self.host_of(carried.head.to).filter(|to| *to != from);
         match to {
             Some(to) => {
                 self.counts.came(carried.head.priority);
@@ -60,7 +60,7 @@ impl Server {
         let mut is_reached = false;
         for system in systems {
             let to = in_system(carried.head.to, system);
-            let Some(client) = self.table.client_of(to) else { continue };
+            let Some(client) = self.host_of(to) else { continue };
             is_reached = true;
             let reaches_itself = client == from || system == own && reaches_own;
             if reaches_itself {
@@ -153,7 +153,7 @@ impl Server {
     fn say_all(&mut self, now_ns: u64, answers: Vec<(Head, Vec<u8>)>, host: &mut impl ServerHost) {
         for (head, body) in answers {
             let carried = Carried { hops: 0, published_ns: now_ns, head, body: &body };
-            match self.table.client_of(head.to) {
+            match self.host_of(head.to) {
                 Some(to) => {
                     self.counts.came(head.priority);
                     // The sender of the command has caused it.

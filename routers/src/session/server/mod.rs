@@ -11,6 +11,7 @@ mod connections;
 mod intake;
 mod look;
 mod member;
+mod moving;
 mod places;
 mod principal;
 mod registering;
@@ -19,13 +20,14 @@ mod rights;
 mod work;
 
 pub use member::MemberState;
+pub use moving::MovingHosts;
 pub use places::Crowded;
 pub(super) use principal::Principals;
 pub use rights::{Names, OwnNode, OwnNodes, Rights};
 
 use super::ClientIndex;
 use super::counts::SessionCounts;
-use super::frame::{RegistrationVerdict, SessionRefusalReason};
+use super::frame::{Range, RegistrationVerdict, SessionRefusalReason};
 use super::table::RoutingTable;
 use super::{EndHost, LOOK_EVERY_NS};
 use member::{Member, RoundTrip};
@@ -47,6 +49,8 @@ pub struct ServerSettings {
     /// What the file gives the nodes of that. A client that has shown a certificate has [other
     /// rights](Server::certify).
     pub own_nodes: OwnNodes,
+    /// Names of its own system that move from node to node. Nobody registers them.
+    pub moving: MovingHosts,
     /// Tells this incarnation from others; not 0.
     pub incarnation: u64,
     /// Clients that may take part at a time.
@@ -220,13 +224,15 @@ impl Server {
     /// All connections.
     pub fn snapshots(&self, now_ns: u64) -> impl Iterator<Item = (ClientIndex, MemberSnapshot)> {
         self.present().map(move |(index, member)| {
-            let hosts = self.table.ranges_of(index).iter().take(HOSTS_MAX);
+            let is_here = |range: &Range| self.host_of(range.first) == Some(index);
+            let moving: Vec<Range> = self.settings.moving.ranges().filter(is_here).collect();
+            let hosts = moving.iter().chain(self.table.ranges_of(index)).take(HOSTS_MAX);
             let snapshot = MemberSnapshot {
                 name: member.name.clone(),
                 peer: String::new(),
                 system: member.system,
                 is_member: member.is_member(),
-                ranges: member.registrations.ranges as u64,
+                ranges: (moving.len() + member.registrations.ranges) as u64,
                 hosts: hosts.map(|range| (range.first, range.last)).collect(),
                 age_ns: now_ns.saturating_sub(member.began_ns),
                 heard_ns: now_ns.saturating_sub(member.heard_ns),
@@ -356,6 +362,14 @@ impl Server {
             return ServerStep::Look;
         }
         ServerStep::Wait { until_ns: self.look_ns }
+    }
+
+    /// The client that hosts a name: a name that moves is hosted by its present node alone.
+    fn host_of(&self, name: Name) -> Option<ClientIndex> {
+        match self.settings.moving.client_of(name) {
+            Some(client) => self.table.client_of(client?),
+            None => self.table.client_of(name),
+        }
     }
 
     fn present(&self) -> impl Iterator<Item = (ClientIndex, &Member)> {

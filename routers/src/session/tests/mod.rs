@@ -3,6 +3,7 @@
 mod admitted;
 mod ends;
 mod ground;
+mod moving;
 mod newest;
 mod oracle;
 mod pipe;

@@ -3,7 +3,7 @@
 use crate::admission::Admission;
 use crate::session::client::ClientSettings;
 use crate::session::frame::Range;
-use crate::session::server::{OwnNodes, ServerSettings};
+use crate::session::server::{MovingHosts, OwnNodes, ServerSettings};
 use rohrpost_mailbox::{Class, Name};
 use rohrpost_testbed::sim::chance::Chance;
 use rohrpost_testbed::sim::clock::Clock;
@@ -147,6 +147,7 @@ pub(super) fn server_settings(incarnation: u64) -> ServerSettings {
         common: COMMON,
         system: Some((1, 11)),
         own_nodes: OwnNodes::default(),
+        moving: MovingHosts::default(),
         incarnation,
         clients_max: 16,
         handshakes_max: 4,

@@ -26,7 +26,7 @@ use crate::session::frame::{BadSessionFrame, Range};
 use crate::session::in_system;
 use crate::shell::sender_cache::SenderCache;
 use crate::shell::transit;
-use reporter::EventReporter;
+use reporter::{EventReporter, TeamWay};
 use rohrpost_mailbox::{
     ALL_SYSTEMS, Head, Interest, Name, Participant, Receiver, Source, Watch, Watches, monotonic_ns,
 };
@@ -68,8 +68,8 @@ impl ClientShell {
     /// # Errors
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
-        let ClientParts { node, name, server, settings, hosts, others, .. } = parts;
-        let ClientParts { beyond, faults, seal, keeps_time, impair, replicas, .. } = parts;
+        let ClientParts { node, name, server, settings, hosts, registers, others, .. } = parts;
+        let ClientParts { beyond, faults, seal, keeps_time, impair, team, replicas, .. } = parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;
@@ -84,12 +84,13 @@ impl ClientShell {
             SenderCache::here(&participant, &hosts),
             FaultWriter::new(faults, format!("beyond the TCP router at {server}")),
         );
+        reporter.team = team.map(|team| TeamWay::new(&participant, team, system));
         reporter.line = replicas.map(|parts| parts.start(node, participant.clone(), shared.round_trip.clone()));
         let counts = LineCounts::of(reporter.line.as_ref());
         let work = ClientThread {
             shared: shared.clone(),
             server: bad_line.as_ref().map_or(server, BadLine::near),
-            client: Client::new(settings, hosts.iter().copied().map(range).collect(), monotonic_ns()),
+            client: Client::new(settings, registers.into_iter().map(range).collect(), monotonic_ns()),
             reporter,
             system,
             others: others.into_iter().map(range).collect(),

@@ -40,9 +40,12 @@ pub struct ClientParts<'a> {
     pub server: SocketAddr,
     /// What it knows.
     pub settings: ClientSettings,
-    /// The names that its node hosts.
+    /// The names that its node hosts, also those that it hosts only while it holds their lease.
     pub hosts: Vec<(Name, Name)>,
-    /// The names that other nodes of its system host, if it brings packages for all systems there itself.
+    /// Those of them that it registers.
+    pub registers: Vec<(Name, Name)>,
+    /// The names that other nodes of its system host, and those that move, if it brings packages for all systems there
+    /// itself.
     pub others: Vec<(Name, Name)>,
     /// The names for which packages go to the server if neither the node nor its LAN has them.
     pub beyond: Vec<(Name, Name)>,
@@ -54,6 +57,8 @@ pub struct ClientParts<'a> {
     pub keeps_time: bool,
     /// A bad network to the server; none: as it is.
     pub impair: Option<impair::ImpairmentSettings>,
+    /// The node's router of the team, if there is one.
+    pub team: Option<Name>,
     /// Its replicas; none: it has none.
     pub replicas: Option<LineParts>,
 }

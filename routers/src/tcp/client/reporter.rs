@@ -6,10 +6,12 @@ use crate::session::client::{ClientEvent, ClientHost};
 use crate::session::frame::Carried;
 use crate::session::{Cause, EndHost};
 use crate::shell::sender_cache::SenderCache;
+use crate::shell::transit;
 use crate::tcp::fault_writer::FaultWriter;
 use crate::tcp::snapshots::Outage;
-use rohrpost_mailbox::{SendError, monotonic_ns};
+use rohrpost_mailbox::{Name, Participant, SendError, monotonic_ns};
 use std::net::SocketAddr;
+use std::sync::Arc;
 
 /// Delivers, answers, and says what happens.
 pub(super) struct EventReporter {
@@ -22,12 +24,29 @@ pub(super) struct EventReporter {
     by_server: bool,
     pub(super) outage: Outage,
     pub(super) line: Option<LineReplicas>,
+    pub(super) team: Option<TeamWay>,
+}
+
+/// The way to the router of the team, which takes what comes from other systems, so that it is delivered once.
+pub(super) struct TeamWay {
+    mailbox: Name,
+    /// That of both.
+    system: u8,
+    /// Of that mailbox alone: other systems must not reach it by its name.
+    sender_cache: SenderCache,
+}
+
+impl TeamWay {
+    pub(super) fn new(participant: &Arc<Participant>, router: Name, system: u8) -> Self {
+        let mailbox = transit::name(router);
+        Self { mailbox, system, sender_cache: SenderCache::here(participant, &[(mailbox, mailbox)]) }
+    }
 }
 
 impl EventReporter {
     pub(super) fn new(server: SocketAddr, sender_cache: SenderCache, fault_writer: FaultWriter) -> Self {
         let (why, outage) = Default::default();
-        Self { server, sender_cache, fault_writer, why, by_server: false, outage, line: None }
+        Self { server, sender_cache, fault_writer, why, by_server: false, outage, line: None, team: None }
     }
 
     /// Says once why the server is not there. `was_made`: the connection was.
@@ -62,6 +81,15 @@ impl EndHost for EventReporter {
 
 impl ClientHost for EventReporter {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
+        let system = carried.head.from.system();
+        if let Some(team) = self.team.as_mut().filter(|team| team.system != system) {
+            let handed = team.sender_cache.send_by(team.mailbox, &carried.head, carried.body);
+            let handed = handed.map_err(NotDelivered::from);
+            // Before that router's first start nothing comes by its way, either.
+            if handed != Err(NotDelivered::NoMailbox) {
+                return handed;
+            }
+        }
         self.sender_cache.send(&carried.head, carried.body).map_err(|error| {
             if let SendError::TooLarge { max, .. } = error {
                 self.fault_writer.takes_bytes = Some(max);

@@ -46,6 +46,14 @@ pub(crate) enum Fault {
         node: usize,
         module: Name,
     },
+    /// All processes of a node die at once, and start again.
+    Death {
+        node: usize,
+    },
+    /// A module with a lease cannot be on at a node.
+    Unready {
+        node: usize,
+    },
     /// A computer sleeps.
     Sleep {
         node: usize,

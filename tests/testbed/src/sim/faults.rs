@@ -3,7 +3,7 @@
 use super::chance::Chance;
 use super::clock::Now;
 use super::fault::Fault;
-use super::host::DATA_MAILBOXES;
+use super::host::{DATA_MAILBOXES, TRANSIT_AGE_MAX_NS};
 use super::package::Role;
 use super::packages::{ROUTER_CLASS, digest};
 use super::plan::{SYSTEM, fixed, incarnation};
@@ -30,7 +30,14 @@ impl World<'_> {
     pub(super) fn begin(&mut self, index: usize) {
         let fault = self.plan.faults[index].fault;
         self.trace.line(self.now_ns, || format!("begins: {fault:?}"));
+        self.lease_suffers(&fault, 1);
         match fault {
+            Fault::Death { node } => {
+                self.oracle.saw("node killed");
+                self.kill_launch(node);
+                self.kill(node);
+            }
+            Fault::Unready { node } => self.change_unready(node, |unready| *unready += 1),
             Fault::Freeze { node, whole } => {
                 self.oracle.saw("frozen");
                 self.stations[node].frozen += 1;
@@ -147,7 +154,13 @@ impl World<'_> {
     pub(super) fn end(&mut self, index: usize) {
         let fault = self.plan.faults[index].fault;
         self.trace.line(self.now_ns, || format!("is over: {fault:?}"));
+        self.lease_suffers(&fault, -1);
         match fault {
+            Fault::Death { node } => {
+                self.start_launch(node);
+                self.at(self.now_ns, Event::Start { node });
+            }
+            Fault::Unready { node } => self.change_unready(node, |unready| *unready -= 1),
             Fault::Freeze { node, whole } => {
                 self.stations[node].frozen -= 1;
                 self.stations[node].asleep -= u32::from(whole);
@@ -182,6 +195,12 @@ impl World<'_> {
         }
     }
 
+    /// Leases are as they should be only a while after a fault; while a node is dead, another one holds them.
+    fn lease_suffers(&mut self, fault: &Fault, change: i32) {
+        let change = if matches!(fault, Fault::Death { .. } | Fault::Unready { .. }) { 0 } else { change };
+        self.leases.as_mut().into_iter().for_each(|leases| leases.goes_wrong(self.now_ns, change));
+    }
+
     fn slew(&mut self, node: usize, slewed_ppb: i64) {
         self.stations[node].clock.slew(self.now_ns, slewed_ppb);
         self.oracle.times.changes(&self.stations[node].clock, node);
@@ -200,6 +219,9 @@ impl World<'_> {
         self.trace.line(self.now_ns, || "all faults are over".into());
         let quality = fixed(self.plan.quality);
         self.links.iter_mut().flatten().for_each(|link| link.quality = quality);
+        // What waits in routers since the last flood is gone then.
+        let gone_ns = self.now_ns + TRANSIT_AGE_MAX_NS;
+        self.leases.as_mut().into_iter().for_each(|leases| leases.goes_wrong(gone_ns, 0));
     }
 
     fn split(&mut self, side: u64, change: impl Fn(&mut u32)) {

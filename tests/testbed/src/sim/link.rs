@@ -36,32 +36,32 @@ const WAIT_NS_MAX: u64 = WIRE_NS_MAX / 2;
 
 /// What becomes of a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Passage {
+pub struct Passage {
     /// When it comes out, true ns.
-    pub(crate) at_ns: u64,
+    pub at_ns: u64,
     /// Whether bits of it were flipped on the way.
-    pub(crate) damaged: bool,
+    pub damaged: bool,
 }
 
 /// A direction with its present state.
 #[derive(Clone, Debug)]
-pub(crate) struct Link {
+pub struct Link {
     /// How it is now.
-    pub(crate) quality: Quality,
+    pub quality: Quality,
     /// How many faults cut it now.
-    pub(crate) cuts: u32,
+    pub cuts: u32,
     free_at_ns: u64,
     last_at_ns: u64,
 }
 
 impl Link {
     /// A link that is whole.
-    pub(crate) fn new(quality: Quality) -> Self {
+    pub fn new(quality: Quality) -> Self {
         Self { quality, cuts: 0, free_at_ns: 0, last_at_ns: 0 }
     }
 
     /// Where a datagram comes out: never, once, or twice.
-    pub(crate) fn pass(&mut self, now_ns: u64, bytes: usize, chance: &mut Chance) -> [Option<Passage>; 2] {
+    pub fn pass(&mut self, now_ns: u64, bytes: usize, chance: &mut Chance) -> [Option<Passage>; 2] {
         let quality = self.quality;
         if self.cuts > 0 || chance.per_million(quality.loss_ppm) {
             return [None, None];

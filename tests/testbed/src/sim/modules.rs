@@ -164,6 +164,10 @@ impl World<'_> {
             let (head, posted_ns) = (package.head, package.posted_ns);
             match package.role {
                 Role::Data | Role::Intruder => {}
+                role @ (Role::Asked(_) | Role::Answered(_) | Role::Held { .. }) => {
+                    let from = package.from_node.into();
+                    self.take_lease(from, node, role);
+                }
                 Role::Answer { call, answer } => self.calls.answered(&mut self.oracle, now, call, answer),
                 Role::Report { call } => self.calls.answered(&mut self.oracle, now, call, Answer::NotRun),
                 Role::Command { call, age_ns } => {

@@ -95,7 +95,7 @@ impl Oracle {
         let leaving = if role == Role::Intruder { head } else { admitted(&head) };
         self.by_head.insert(key(&head), number);
         let place = self.places.entry((head.from, head.to, leaving.priority.0)).or_default();
-        *place += u32::from(!matches!(role, Role::Report { .. } | Role::Intruder));
+        *place += u32::from(role.has_place());
         self.packages.push(Package {
             head: leaving,
             from_node: nodes.0 as NodeIndex,

@@ -2,6 +2,7 @@
 
 use rohrpost_mailbox::{Head, Priority, local};
 use rohrpost_routers::frame::NodeIndex;
+use rohrpost_supervision::lease::{self, Ask};
 
 /// What a caller is told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -32,9 +33,25 @@ pub(crate) enum Role {
     Report {
         call: usize,
     },
+    /// A launch asks the witness of a lease.
+    Asked(Ask),
+    /// The witness answers a launch.
+    Answered(lease::Answer),
+    /// Data of the holder of a lease.
+    Held {
+        /// Place of the lease in the order in which they were given.
+        lease: usize,
+    },
     /// What nobody needs, from a hostile program: it writes what it likes in its heads, and its router caps no
     /// priority.
     Intruder,
+}
+
+impl Role {
+    /// Whether its packages stand in an order with those of the same sender, receiver and priority.
+    pub(super) fn has_place(self) -> bool {
+        !matches!(self, Self::Report { .. } | Self::Held { .. } | Self::Intruder)
+    }
 }
 
 /// How far a package has come at its sender's side.

@@ -69,6 +69,9 @@ pub enum Promise {
     /// Requests for parts and parts that leave again are few, parts leave the wire to packages, and a node has no more
     /// than its replicas.
     RecordBounds,
+    /// No two nodes hold the lease of a module, and a while after the last fault one does; nothing of an earlier holder
+    /// is delivered where a later one was heard.
+    Leases,
     /// With time slots nobody sends while its own bound is greater than what is allowed, or while it is further off in
     /// truth.
     SilentWhenUnsure,
@@ -100,6 +103,7 @@ impl Promise {
         Self::RecordOrder,
         Self::RecordAccounts,
         Self::RecordBounds,
+        Self::Leases,
         Self::SilentWhenUnsure,
     ];
 }

@@ -154,7 +154,10 @@ impl Oracle {
             "with another priority than it may have"
         } else if head.to.class() == ROUTER_CLASS && head.to.local() >= local::TRANSIT {
             "to a router's own mailbox"
-        } else if self.is_sealed && head.from.instance() != package.from_node {
+        } else if self.is_sealed
+            && head.from.instance() != package.from_node
+            && !matches!(package.role, Role::Held { .. })
+        {
             "in the name of another node"
         } else {
             return;
@@ -176,7 +179,7 @@ impl Oracle {
         let took_ns = now.true_ns - package.posted_ns;
         let slowest_ns = self.slowest_ns.entry((head.from, head.to, head.priority.0)).or_default();
         *slowest_ns = took_ns.max(*slowest_ns);
-        let has_place = !twice && !redelivered && !matches!(package.role, Role::Report { .. } | Role::Intruder);
+        let has_place = !twice && !redelivered && package.role.has_place();
         if twice {
             let text = format!("package {number} was delivered twice by one router: {head:?}");
             self.broken(now, Promise::NoCopies, text);

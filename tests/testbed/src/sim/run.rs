@@ -1,6 +1,7 @@
 //! One seed, from its plan to its verdict.
 
 use super::calls::NewGuard;
+use super::lease_plan::LeasePlan;
 use super::packages::{Free, Packages, settings};
 use super::plan::{Flow, Plan, incarnation};
 use super::promise::Problem;
@@ -28,7 +29,8 @@ pub struct Outcome {
 }
 
 /// Runs a plan.
-pub fn run(plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
+pub fn run(mut plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
+    plan.leases.iter_mut().for_each(LeasePlan::begin);
     let plan = Rc::new(plan);
     let rings = Rc::new(Rings::new(&plan));
     let layers = routers(&plan, &rings);

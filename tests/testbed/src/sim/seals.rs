@@ -15,10 +15,12 @@ const KEY: [u8; KEY_BYTES] = [0x5a; KEY_BYTES];
 
 /// The peer sessions of an incarnation of a router; none yet.
 pub(super) fn peer_sessions(settings: &Settings) -> Arc<PeerSessions> {
-    PeerSessions::new(
-        RouterIdentity::of(settings),
-        KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &KEY), None),
-    )
+    PeerSessions::new(RouterIdentity::of(settings), keys())
+}
+
+/// The key that all have.
+pub(super) fn keys() -> KeyRing {
+    KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &KEY), None)
 }
 
 /// What the layer of packages has.

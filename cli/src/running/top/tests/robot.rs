@@ -93,7 +93,7 @@ impl Robot {
         let noted = |name| (name == self.name("motor.0")).then(MotorInterface::description);
         let details = match app.screen {
             super::super::app::Screen::Details(name) => {
-                details::page(&self.installation, &self.now, &self.model, name, noted)
+                details::page(&self.installation, &self.now, &self.model, name, (None, noted))
             }
             _ => Vec::new(),
         };

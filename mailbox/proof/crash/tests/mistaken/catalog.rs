@@ -1,16 +1,6 @@
 //! The mistakes, each with the scene that notices it. `broken!` asks whether its mistake is made.
 
-use rohrpost_planted::{Edit, edit, instead, left_out};
-
-/// A mistake that one could make.
-pub(crate) struct Mistake {
-    pub(crate) name: &'static str,
-    pub(crate) edits: &'static [Edit],
-    /// The test that fails.
-    pub(crate) scene: &'static str,
-    /// What it says. `check …` is one of the aftermath.
-    pub(crate) says: &'static str,
-}
+use rohrpost_planted::{Mistake, edit, instead, left_out};
 
 const SENDING: &str = "sending::a_sender_dies_sending";
 
@@ -24,14 +14,14 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "let left = if broken!(what_the_dead_filled_is_published) { Word::ready(Priority(0), 0) } else { FREE };
                 freed += usize::from(self.change(slot, word, left));",
         )],
-        scene: SENDING,
+        test: SENDING,
         says: "check Whole",
     },
     // The slot is lost for ever.
     Mistake {
         name: "claims_of_the_dead_stay",
         edits: &[edit("slots/protocol.rs", "if dead(by) {", "if !broken!(claims_of_the_dead_stay) && dead(by) {")],
-        scene: SENDING,
+        test: SENDING,
         says: "check Usable",
     },
     Mistake {
@@ -41,14 +31,14 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "victim.into_iter().for_each(&mut lost);",
             "victim.filter(|_| !broken!(the_dead_forget_what_they_displaced)).into_iter().for_each(&mut lost);",
         )],
-        scene: "sending::a_sender_dies_displacing",
+        test: "sending::a_sender_dies_displacing",
         says: "no loss is hidden",
     },
     // Sent, and its sender died before it could hint.
     Mistake {
         name: "a_search_looks_at_hints_alone",
         edits: &[left_out("slots/queue.rs", "(0..slots.count()).for_each(|slot| self.defer(slot));")],
-        scene: SENDING,
+        test: SENDING,
         says: "check Drained",
     },
     Mistake {
@@ -58,7 +48,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "if word.state() != State::Taken {",
             "if broken!(what_was_in_dead_hands_stays_there) || word.state() != State::Taken {",
         )],
-        scene: "receiving::a_receiver_dies_receiving",
+        test: "receiving::a_receiver_dies_receiving",
         says: "check Drained",
     },
     // It kills its next receiver, and the one after that.
@@ -74,19 +64,19 @@ pub(crate) const MISTAKES: &[Mistake] = &[
                 };
                 self.change(slot, word, again);",
         )],
-        scene: "receiving::a_receiver_dies_receiving",
+        test: "receiving::a_receiver_dies_receiving",
         says: "assertion `left == right` failed",
     },
     Mistake {
         name: "poison_is_dropped_uncounted",
         edits: &[left_out("slots/protocol.rs", "poison(word.priority());")],
-        scene: "receiving::a_receiver_dies_adopting_what_killed_the_last_two",
+        test: "receiving::a_receiver_dies_adopting_what_killed_the_last_two",
         says: "0 counted as poison",
     },
     Mistake {
         name: "a_death_rings_nobody",
         edits: &[left_out("node/directory.rs", "doorbell::ring_all(self);")],
-        scene: "sending::a_sender_dies_beside_a_sleeping_receiver",
+        test: "sending::a_sender_dies_beside_a_sleeping_receiver",
         says: "left: None",
     },
     // ---- accounts ----
@@ -98,7 +88,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "let counted = u64::from(!broken!(the_stale_are_dropped_uncounted));
             self.segment.page().counters.lost(taken.word().priority(), Loss::Stale, counted);",
         )],
-        scene: "receiving::a_receiver_dies_dropping_stale_packages",
+        test: "receiving::a_receiver_dies_dropping_stale_packages",
         says: "check Accounts",
     },
     Mistake {
@@ -109,7 +99,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "let counted = u64::from(!broken!(what_is_given_up_is_uncounted));
         old.page().counters.lost(taken.word().priority(), Loss::Closed, counted);",
         )],
-        scene: "receiving::a_receiver_dies_replacing_a_mailbox_of_another_shape",
+        test: "receiving::a_receiver_dies_replacing_a_mailbox_of_another_shape",
         says: "0 counted as lost",
     },
     // ---- the mailbox goes on ----
@@ -120,7 +110,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "priority.outranks(word.priority())",
             "(priority.outranks(word.priority()) || broken!(equals_are_displaced) && priority == word.priority())",
         )],
-        scene: SENDING,
+        test: SENDING,
         says: "check Full",
     },
     Mistake {
@@ -130,7 +120,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "if slot >= slots.count() {",
             "if slot >= slots.count() - usize::from(broken!(the_last_slot_is_overlooked)) {",
         )],
-        scene: SENDING,
+        test: SENDING,
         says: "check Received",
     },
     Mistake {
@@ -140,13 +130,13 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "if claim.place == FREE { ticket }",
             "if broken!(the_last_goes_first) { !ticket } else if claim.place == FREE { ticket }",
         )],
-        scene: SENDING,
+        test: SENDING,
         says: "check InOrder",
     },
     Mistake {
         name: "nothing_is_released",
         edits: &[left_out("slots/protocol.rs", "self.change(taken.slot, taken.word, FREE);")],
-        scene: SENDING,
+        test: SENDING,
         says: "check UsableAgain",
     },
     Mistake {
@@ -156,7 +146,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "while let Some(taken) = self.queue.take(&slots) {",
             "while let Some(taken) = self.queue.take(&slots).filter(|_| !broken!(closing_finds_nothing)) {",
         )],
-        scene: SENDING,
+        test: SENDING,
         says: "check Closed",
     },
     // ---- the node ends ----
@@ -171,7 +161,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             ),
             left_out("node/participant.rs", "entry.pid.store(0, Ordering::Release);"),
         ],
-        scene: SENDING,
+        test: SENDING,
         says: "check Nobody",
     },
     Mistake {
@@ -184,20 +174,20 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             return std::mem::forget(self.file.try_clone());
         }\n",
         )],
-        scene: SENDING,
+        test: SENDING,
         says: "check Removable",
     },
     Mistake {
         name: "the_directory_stays",
         edits: &[left_out("node/registry.rs", "self.directory().remove_all().map_err(failed)?;")],
-        scene: SENDING,
+        test: SENDING,
         says: "check Gone",
     },
     // ---- streams ----
     Mistake {
         name: "a_finished_record_is_forgotten",
         edits: &[instead("stream/writing.rs", "named_end(ring, counted)", "counted")],
-        scene: "streams::a_writer_dies_writing",
+        test: "streams::a_writer_dies_writing",
         says: "a finished record",
     },
     Mistake {
@@ -207,13 +197,13 @@ pub(crate) const MISTAKES: &[Mistake] = &[
             "unwrap_or_else(|| old.map_or(0, ",
             "unwrap_or_else(|| old.filter(|_| !broken!(the_sequence_begins_anew)).map_or(0, ",
         )],
-        scene: "streams::a_writer_dies_replacing_a_stream_of_another_shape",
+        test: "streams::a_writer_dies_replacing_a_stream_of_another_shape",
         says: "the sequence goes on",
     },
     Mistake {
         name: "half_of_what_is_left_out_stays",
         edits: &[left_out("stream/writing.rs", "leave_out(ring, sequence, newest, (OmissionCause::Lost, before));")],
-        scene: "streams::a_writer_of_a_replica_dies_leaving_records_out",
+        test: "streams::a_writer_of_a_replica_dies_leaving_records_out",
         says: "waits for what was left out",
     },
 ];

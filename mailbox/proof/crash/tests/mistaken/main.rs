@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!  mailbox/src ───────── each edit of catalog.rs ──▶ copy, one for all mistakes ──▶ the root of this crate
-//!  tests/crash/*.rs ──── ignored by themselves ────▶ run by noticed.rs, in a process for each mistake
+//!  tests/crash/*.rs ──── ignored by themselves ────▶ run in a process for each mistake
 //! ```
 //!
 //! Without a mistake all scenes pass, and together they die at each `step!` that the mailbox has.

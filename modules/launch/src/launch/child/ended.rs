@@ -1,10 +1,11 @@
 //! What follows when a process has ended, and what is said about it.
 
-use super::ending::{ChildShutdown, EndCause};
+use super::ending::{ChildShutdown, EndCause, Then};
 use super::{Child, Phase, ProcessEnd, cut};
 use crate::launch::policy::Next;
 use crate::launch::repeats::Tell;
 use rohrpost_config::Restart;
+use rohrpost_mailbox::monotonic_ns;
 use rohrpost_modules::common::OutputLevel;
 use rohrpost_modules::runtime::StartError;
 use std::os::unix::process::ExitStatusExt;
@@ -12,14 +13,19 @@ use std::process::ExitStatus;
 use std::time::Instant;
 
 impl Child {
-    /// It has ended: again, or not, as was asked for, or as its policy has it.
+    /// The process has ended: again, or not, as was asked for, or as its policy has it.
     pub(super) fn ended(&mut self, status: ExitStatus, now: Instant) -> Option<String> {
         let how = match (status.code(), status.signal()) {
             (Some(code), _) => format!("ended with {code}"),
             (None, Some(signal)) => format!("was killed by signal {signal}"),
             (None, None) => "ended".to_owned(),
         };
-        let hang = match self.ending.take() {
+        let told = self.ending.take();
+        if told.is_none() && self.off_ns.is_some_and(|off_ns| monotonic_ns() >= off_ns) {
+            self.printed.pass_on(false);
+            return self.ended_as_told(Then::StandBy, false, &how, now);
+        }
+        let hang = match told {
             Some(ChildShutdown { cause: EndCause::Told(then), killed, .. }) => {
                 self.printed.pass_on(false);
                 return self.ended_as_told(then, killed.is_some(), &how, now);
@@ -34,7 +40,8 @@ impl Child {
         // Started again, it would find the same configuration, and the same program.
         let misconfigured = hang.is_none() && status.code() == Some(i32::from(StartError::CONFIGURATION));
         let is_hopeless = misconfigured || !self.has_joined && cannot_begin(status, &self.printed.last());
-        let success = hang.is_none() && status.success();
+        // One that stood by has done no work yet: with any code, its end is none that it meant.
+        let success = hang.is_none() && status.success() && self.phase != Phase::StandsBy;
         let next = if is_hopeless || self.last_incarnation { Next::Stay } else { self.policy.ended(success, now) };
         let how = match hang {
             Some(hang) => format!("{hang}, and {how}"),
@@ -62,8 +69,7 @@ impl Child {
             }
             Next::Again(pause) => {
                 self.restarts += 1;
-                self.phase = Phase::Waiting;
-                self.since = now + pause;
+                self.begin_waiting(now + pause);
                 let tell = self.repeats.ended(self.policy.in_a_row(), &self.last_end, now);
                 (format!("{how}; starts again in {pause:?}"), tell)
             }

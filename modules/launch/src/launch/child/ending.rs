@@ -9,11 +9,13 @@ use std::time::{Duration, Instant};
 /// What becomes of a module that is told to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::launch) enum Then {
-    /// It stays ended until somebody starts it.
+    /// The module stays ended until somebody starts it.
     Stay,
-    /// It is started again.
+    /// The module is started again.
     Start,
-    /// It is launch that ends.
+    /// The module stands by: another of its nodes may run it from now on.
+    StandBy,
+    /// Launch itself ends.
     End,
 }
 
@@ -76,9 +78,14 @@ impl Child {
                 Some(format!("{} is stopped, as asked", self.text))
             }
             Then::Start => {
-                self.phase = Phase::Waiting;
-                self.since = now;
+                self.begin_waiting(now);
                 Some(format!("{} is started again, as asked", self.text))
+            }
+            Then::StandBy => {
+                // Switched off or on by somebody, it was for as long as its node held the lease.
+                self.turn_on = self.configured_on;
+                self.rest(Phase::StandsBy);
+                Some(format!("{} stands by: this node does not hold its lease any more", self.text))
             }
         }
     }
@@ -101,11 +108,58 @@ impl Child {
         if self.process.is_some() || self.over.is_some() {
             self.process.iter_mut().for_each(|process| process.terminate(node));
             self.phase = Phase::Stopping;
-            self.ending = Some(ChildShutdown::begin(EndCause::Told(then), self.stop_within, now));
+            let within = if then == Then::StandBy { self.off_within } else { self.stop_within };
+            self.ending = Some(ChildShutdown::begin(EndCause::Told(then), within, now));
         } else if then == Then::Start {
-            (self.phase, self.since) = (Phase::Waiting, now);
+            self.begin_waiting(now);
         } else if !self.phase.is_over() {
-            self.rest(if then == Then::Stay { Phase::Stopped } else { Phase::Ended });
+            self.rest(match then {
+                Then::Stay => Phase::Stopped,
+                Then::StandBy => Phase::StandsBy,
+                Then::Start | Then::End => Phase::Ended,
+            });
+        }
+    }
+
+    /// Whether its node is to hold its lease, or could. One that is on its way to its end still holds it; so does one
+    /// that has done its work, or another node would do that again.
+    pub(in crate::launch) fn may_hold(&self) -> bool {
+        let has_left = self.last_incarnation && self.process.is_none() && self.over.is_none();
+        !has_left && (!self.phase.is_over() || self.phase == Phase::Ended)
+    }
+
+    /// The node holds the module's lease until then, ns of the monotonic clock, or does not: what runs without one is
+    /// killed if it is not off by itself.
+    pub(in crate::launch) fn hold(&mut self, until_ns: Option<u64>, node: &Node, now: Instant) {
+        let holds = until_ns.is_some();
+        self.off_ns = until_ns.or(self.off_ns);
+        let had = !std::mem::replace(&mut self.stands_by, !holds);
+        if holds && self.phase == Phase::StandsBy && !self.last_incarnation {
+            match self.process.is_some() {
+                // Its timer and its event have told it so.
+                true => (self.phase, self.since) = (Phase::Starting, now),
+                false => self.begin_waiting(now),
+            }
+        }
+        if had && !holds && self.phase == Phase::Ended {
+            self.phase = Phase::StandsBy;
+        }
+        if !had || holds || self.phase.is_over() {
+            return;
+        }
+        match self.ending.is_some() {
+            true => _ = self.force(node, now),
+            false => self.tell_to_end(Then::StandBy, node, now),
+        }
+    }
+
+    /// From then on it may be started, as soon as its node holds its lease if others may run it.
+    pub(super) fn begin_waiting(&mut self, from: Instant) {
+        self.since = from;
+        if self.stands_by {
+            self.rest(Phase::StandsBy);
+        } else {
+            self.phase = Phase::Waiting;
         }
     }
 

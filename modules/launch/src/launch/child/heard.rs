@@ -1,6 +1,7 @@
 //! What launch hears of a module while it runs: its last word in the node's table.
 
 use super::Child;
+use crate::launcher::Phase;
 use rohrpost_mailbox::{ModuleState, Node, ParticipantInfo};
 use rohrpost_modules::common::OutputLevel;
 use rohrpost_modules::output::plain;
@@ -33,7 +34,7 @@ impl Child {
         (word.state == Some(ModuleState::Error) || word.complains).then_some(word.errors)
     }
 
-    /// The same, if why is not known yet.
+    /// The number of the error or complaint of which the cause is not known yet.
     pub(in crate::launch) fn asks_why(&mut self, node: &Node) -> Option<u32> {
         let in_trouble = self.in_trouble(node);
         self.health.asks_why(in_trouble)
@@ -43,6 +44,16 @@ impl Child {
     pub(in crate::launch) fn present_error(&self, node: &Node) -> Option<String> {
         let why = self.health.present_error().filter(|_| self.in_error(node).is_some());
         why.map(|why| format!("{} is in error: {}", self.text, plain::line(why)))
+    }
+
+    /// What it is instead of on, if it runs and is in error, or is meant to be on.
+    pub(in crate::launch) fn not_on(&self, node: &Node) -> Option<String> {
+        let state = self.state_of(node);
+        let is_wrong = state == Some(ModuleState::Error) || self.turn_on && state != Some(ModuleState::On);
+        (self.phase == Phase::Running && is_wrong).then(|| {
+            let state = state.map_or("gone", ModuleState::name);
+            self.present_error(node).unwrap_or_else(|| format!("{} is {state}", self.text))
+        })
     }
 
     /// Looks whether a part of its own code has not come back for long.

@@ -61,6 +61,11 @@ impl ModuleProcess {
         node.last_word_of(self.name, self.pid()).filter(|word| word.joined_after(self.before))
     }
 
+    /// Whether the node gave out this incarnation after it began. They wrap.
+    pub(super) fn began_before(&self, incarnation: u32) -> bool {
+        incarnation.wrapping_sub(self.before).cast_signed() > 0
+    }
+
     /// The module's process, if it is another one than launch has started.
     fn within(&self, node: &Node) -> Result<Option<ParticipantProcess>, ProcessError> {
         let word = self.last_word(node).filter(|word| word.pid != self.started.id());

@@ -41,10 +41,11 @@ impl Child {
         }
     }
 
-    /// Ends it for a cause that others know, if it is on and has run for so long; whether it was.
-    pub(in crate::launch) fn end_failing(&mut self, cause: &str, ran_for: Duration, node: &Node, now: Instant) -> bool {
+    /// Ends it for a cause that others know, if it is on in the process that called them with this incarnation; whether
+    /// it was.
+    pub(in crate::launch) fn end_failing(&mut self, cause: &str, incarnation: u32, node: &Node, now: Instant) -> bool {
         let is_on = self.phase == Phase::Running && self.state_of(node) == Some(ModuleState::On);
-        let is_meant = is_on && now.saturating_duration_since(self.since) >= ran_for;
+        let is_meant = is_on && self.process.as_ref().is_some_and(|process| process.began_before(incarnation));
         if is_meant {
             self.end_hung(cause.to_owned(), node, now);
         }

@@ -43,6 +43,7 @@ fn seen() -> Snapshot {
         sent: 3,
         bytes_out: 30,
         depth: 1,
+        in_turn: Some(Duration::from_millis(4200)),
         working: Some(Working { part: "`tick`".into(), lasts: Duration::from_millis(4200) }),
         child: Some(ChildState {
             module: "laser.0".into(),

@@ -210,5 +210,11 @@ pub(crate) const CARRYING: Group = Group {
             shows_in: "fragment::tests::memory_is_bounded_and_the_least_important_gives_way",
             edits: &[or("fragment/mod.rs", "if self.partial.len() < PARTIAL_MAX")],
         },
+        Planted {
+            name: "TakesFormerHolders",
+            text: "Settings: what a former holder of a lease sends under its name is taken.",
+            shows_in: "moving::tests::packages_go_to_the_holder_and_come_from_it_alone",
+            edits: &[or("settings.rs", "self.moving.node_of(head.from).is_none()")],
+        },
     ],
 };

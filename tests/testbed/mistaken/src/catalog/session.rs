@@ -158,10 +158,7 @@ pub(crate) const SESSION: Group = Group {
             name: "HandsBack",
             text: "Session: a package that a client cannot deliver comes back to it.",
             shows_in: "session::tests::ends::packages_go_to_the_host_of_the_name_and_never_back",
-            edits: &[or(
-                "session/server/carry.rs",
-                "let to = self.table.client_of(carried.head.to).filter(|to| *to != from",
-            )],
+            edits: &[or("session/server/carry.rs", "let to = self.host_of(carried.head.to).filter(|to| *to != from")],
         },
         Planted {
             name: "ToOwnTwice",

@@ -27,6 +27,8 @@ pub(crate) enum Network {
     Replicated,
     /// The same with slots.
     SlottedReplicated,
+    /// With a module that several nodes may run.
+    Leased,
 }
 
 impl Network {
@@ -47,6 +49,7 @@ impl Network {
             Self::Edited => Plan::edited(seed),
             Self::Replicated => Plan::new(seed).replicated(),
             Self::SlottedReplicated => Plan::small_slotted(seed).replicated(),
+            Self::Leased => Plan::leased(seed),
         }
     }
 }
@@ -100,6 +103,7 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::AdmitsForeignNames, Promise::Admission, Network::Intruded, 0),
     caught(Mistake::AdmitsRoutersOwn, Promise::Admission, Network::Intruded, 0),
     caught(Mistake::AdmitsPackets, Promise::Admission, Network::Intruded, 0),
+    caught(Mistake::TakesFormerHolders, Promise::Leases, Network::Leased, 23),
     // What is rejected though nothing is wrong with it.
     caught(Mistake::RejectsAsDamaged, Promise::Rejection, Network::Free, 0),
     caught(Mistake::RejectsAsForeign, Promise::Rejection, Network::Free, 0),

@@ -53,6 +53,7 @@ pub(crate) fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usiz
         tdma: plan.slots_of(edition).map(|slots| slots.table.clone()),
         routes,
         senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
+        moving: plan.leases.as_ref().map_or_else(Default::default, |leases| leases.moving[node].clone()),
         hosts: Vec::new(),
         admission: Admission {
             router: Some(ROUTER_CLASS),

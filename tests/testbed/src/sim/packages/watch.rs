@@ -1,6 +1,7 @@
 //! What the cores of packages tell of, written into the oracle: losses, deliveries, events.
 
 use crate::sim::host::Closed;
+use crate::sim::package::Role;
 use crate::sim::promise::Promise;
 use crate::sim::station::Io;
 use rohrpost_mailbox::{Head, Kind, Options};
@@ -54,6 +55,10 @@ impl Report for Watch<'_, '_> {
         } else {
             io.oracle.lost_behind(io.now, io.life, head)
         };
+        let role = number.map(|number| io.oracle.packages[number as usize].role);
+        if cause == Cause::ForeignName && matches!(role, Some(Role::Held { .. })) {
+            io.oracle.saw("a holder is refused");
+        }
         // One that was handed out before may have been delivered then; so may the copy that a router finds on the wire
         // when it begins.
         let is_first = !head.options.has(Options::REDELIVERED) && (self.is_out || !self.is_young);

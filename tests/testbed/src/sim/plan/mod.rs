@@ -11,6 +11,7 @@ pub(super) use draw::{masters, node};
 
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
+use super::lease_plan::LeasePlan;
 use super::link::Quality;
 use super::replicas::StreamPlan;
 use super::slots::Slots;
@@ -126,6 +127,8 @@ pub struct Plan {
     pub(crate) streams: Vec<StreamPlan>,
     /// Commands.
     pub(crate) calls: Vec<CallPlan>,
+    /// The module that several nodes may run, if there is one.
+    pub(crate) leases: Option<LeasePlan>,
     /// What goes wrong.
     pub(crate) faults: Vec<Planned>,
     /// The nodes that may be master of time, in order.
@@ -183,6 +186,7 @@ impl Plan {
             flows: Vec::new(),
             streams: Vec::new(),
             calls: Vec::new(),
+            leases: None,
             faults: Vec::new(),
             checksum,
             moments_ns: None,
@@ -239,8 +243,19 @@ impl Plan {
         let intervals = TIMED_INTERVALS + self.masters.len() as u64;
         self.timed_ns = self.fixed_ns + intervals * self.shape.interval_ns;
         self.stepped_ns = self.timed_ns + EPOCH_PAUSE_NS;
-        self.traffic_end_ns = self.fixed_ns + RECOVERY_NS + WELL_NS;
+        self.traffic_end_ns = self.well_ns() + WELL_NS;
         self.end_ns = (self.traffic_end_ns + DRAIN_NS).max(self.timed_ns + S);
+    }
+
+    /// From then on all must be well, true ns.
+    pub(super) fn well_ns(&self) -> u64 {
+        let leases_ns = self.leases.as_ref().map_or(0, LeasePlan::well_after_ns);
+        self.fixed_ns + RECOVERY_NS.max(leases_ns)
+    }
+
+    /// Whether links lose, copy or reorder datagrams before all is fixed.
+    pub(super) fn is_lossy(&self) -> bool {
+        self.quality != fixed(self.quality)
     }
 
     /// How often a flow publishes with all others at once, ns.

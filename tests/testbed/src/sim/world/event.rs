@@ -33,6 +33,10 @@ pub(in crate::sim) enum Event {
     Try { call: usize },
     /// A module takes its next command.
     Serve { node: usize, module: Name },
+    /// A launch has something to do about leases.
+    Launch { node: usize },
+    /// The holder of a lease publishes, in this life of its launch.
+    Publish { node: usize, run: u32 },
     /// All is looked at; clocks wander.
     SnapshotRequest,
 }

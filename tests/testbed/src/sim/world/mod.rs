@@ -15,12 +15,13 @@ use super::chance::Chance;
 use super::clock::{Clock, Now};
 use super::events::Events;
 use super::host::DATA_MAILBOXES;
+use super::leases::Leases;
 use super::link::Link;
 use super::oracle::Oracle;
 use super::plan::Plan;
 use super::promise::Problem;
 use super::replicas::{RecordBooks, Rings, Streams};
-use super::spans::{MS, RECOVERY_NS, S};
+use super::spans::{MS, S};
 use super::station::{Arrived, Layer, Sent, Station};
 use super::ticking;
 use super::times::Left;
@@ -49,6 +50,8 @@ pub(crate) struct World<'a> {
     /// The modules that write streams, and those that read them.
     pub(super) streams: Streams,
     pub(crate) calls: Calls,
+    /// Of a module with several nodes, if there is one.
+    pub(super) leases: Option<Leases>,
     pub(crate) trace: Trace,
     new_layers: NewLayers<'a>,
     lives: u32,
@@ -85,7 +88,7 @@ impl<'a> World<'a> {
         let mut oracle = Oracle::new(plan.shape.bulk_below);
         (oracle.is_sealed, oracle.records) = (plan.sealed, RecordBooks::new(&plan.streams));
         oracle.times = Times::new(stations.iter().map(|station| station.clock.clone()).collect());
-        (oracle.wire, oracle.well_ns) = (Wire::new(count), plan.fixed_ns + RECOVERY_NS);
+        (oracle.wire, oracle.well_ns) = (Wire::new(count), plan.well_ns());
         let mut world = Self {
             now_ns: 0,
             events: Events::default(),
@@ -96,6 +99,7 @@ impl<'a> World<'a> {
             oracle,
             streams: Streams::new(&plan, rings),
             calls: Calls::default(),
+            leases: plan.leases.as_ref().map(Leases::new),
             trace: Trace::new(trace),
             new_layers: layers,
             lives: 0,
@@ -129,6 +133,7 @@ impl<'a> World<'a> {
         }
         self.at(0, Event::SnapshotRequest);
         self.schedule_streams();
+        self.schedule_leases();
     }
 
     pub(super) fn at(&mut self, at_ns: u64, event: Event) {
@@ -193,6 +198,8 @@ impl<'a> World<'a> {
             Event::Call { caller } => self.call(caller),
             Event::Try { call } => self.try_call(call),
             Event::Serve { node, module } => self.serve(node, module),
+            Event::Launch { node } => self.wake_launch(node),
+            Event::Publish { node, run } => self.publish(node, run),
             Event::SnapshotRequest => {
                 self.look();
                 self.at(self.now_ns + LOOK_NS, Event::SnapshotRequest);
