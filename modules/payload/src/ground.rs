@@ -62,6 +62,16 @@ impl Ground {
         self.cell_m
     }
 
+    /// Digest of the map, as teams tell it.
+    pub fn digest(&self) -> u64 {
+        self.digest
+    }
+
+    /// The middle of a cell: x and y, metres.
+    pub fn middle_m(&self, cell: Cell) -> (f64, f64) {
+        self.placement.middle_m(&self.grid, cell)
+    }
+
     /// The cell of a place that a teammate has told.
     pub fn cell_at(&self, Position { x_mm, y_mm }: Position) -> Option<Cell> {
         self.placement.cell(&self.grid, f64::from(x_mm) / 1000.0, f64::from(y_mm) / 1000.0)

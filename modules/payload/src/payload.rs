@@ -12,6 +12,7 @@ use rohrpost_robot::lookout::Lookout;
 use rohrpost_supervision::{Order, Promise};
 use rohrpost_team::coordination::{Sharing, Traffic, TrafficMessage};
 use rohrpost_team::events::{EventHead, Refused, Tree};
+use rohrpost_team::grid::Cell;
 use rohrpost_team::group::Hello;
 use rohrpost_team::view::Records;
 use rohrpost_team::{Malformed, RobotId, Team, TeamSettings};
@@ -209,6 +210,30 @@ impl Payload {
     pub fn destination_m(&self) -> Option<(f64, f64)> {
         let (cell, _) = self.state.navigation.destination?;
         Some(self.state.ground.placement.middle_m(&self.state.ground.grid, cell))
+    }
+
+    /// Where the robot is, as its sensors said last; `None` before the first pose.
+    pub fn pose(&self) -> Option<Pose> {
+        self.state.fix.map(|fix| fix.pose)
+    }
+
+    /// The cell in which the robot is; `None` while it is lost.
+    pub fn cell(&self) -> Option<Cell> {
+        self.state.cell()
+    }
+
+    /// Cells to which it goes, as far as they are planned: the next one first.
+    pub fn way(&self) -> Vec<Cell> {
+        let navigation = &self.state.navigation;
+        let destination = navigation.destination.map(|(cell, _)| cell);
+        let mut way: Vec<Cell> = navigation.next.into_iter().chain(destination).collect();
+        way.dedup();
+        way
+    }
+
+    /// The floor on which it drives.
+    pub fn ground(&self) -> &Ground {
+        &self.state.ground
     }
 
     /// What robots do about intruders, and exits that nobody holds; `None` without intruder, plan or coordination.

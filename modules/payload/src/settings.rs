@@ -1,7 +1,9 @@
 //! Speeds, times and distances of a robot's program.
 
-use rohrpost_team::RobotId;
 use rohrpost_team::coordination::TrafficSettings;
+use rohrpost_team::group::GroupSettings;
+use rohrpost_team::view::ViewSettings;
+use rohrpost_team::{RobotId, TeamSettings};
 use std::collections::BTreeSet;
 
 /// Fits cells of 1 m, a beat of 500 ms and these speeds.
@@ -106,6 +108,23 @@ pub enum RefusedSettings {
 }
 
 impl Settings {
+    /// Distances and ages of a team of such robots. `beat_ns`: from one hello to the next; `max_age_ns`: with a hello
+    /// that is older, a robot is silent.
+    pub fn team(&self, beat_ns: u64, max_age_ns: u64) -> TeamSettings {
+        const S_NS: u64 = 1_000_000_000;
+        let view = ViewSettings {
+            gate_mm: (self.gate_m * 1000.0) as u64,
+            sightings: 5,
+            certainty_max_age_ns: 10 * S_NS,
+            intruder_max_age_ns: 120 * S_NS,
+            friend_max_age_ns: 30 * S_NS,
+            friend_radius_mm: 450,
+            speed_max_mm_s: 600,
+        };
+        let group = GroupSettings { beat_ns, max_age_ns };
+        TeamSettings { group, view, drift_ppb: 60_000, clock_off_ns: 60 * S_NS }
+    }
+
     /// Checks all.
     ///
     /// # Errors
