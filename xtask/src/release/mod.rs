@@ -66,8 +66,8 @@ fn megabytes(file: &Path) -> Result<f64, Failure> {
     Ok(bytes as f64 / 1e6)
 }
 
-/// Builds nothing anew that the tests have built, if by their profile: see `checks`. The example is there for Cargo, which
-/// unites features with those that tests ask for only if it builds what tests could use.
+/// Builds nothing anew that the tests have built, if by their profile: see `checks`. The example is there for Cargo,
+/// which unites features with those that tests ask for only if it builds what tests could use.
 fn build(profile: Profile, has_bridge: bool) -> Result<(), Failure> {
     let mut build = match profile {
         Profile::Dev => checked(&["build", "--workspace", "--lib", "--bin", "rohrpost", "--example", "own_view"]),
