@@ -96,8 +96,8 @@ impl Plan {
         self.end_ns = self.traffic_end_ns + DRAIN_NS;
     }
 
-    /// Longest time from a router's start to its first datagram, ns: a joining node hears some Syncs before it asks, and
-    /// a master is given time to answer.
+    /// Longest time from a router's start to its first datagram, ns: a joining node hears some Syncs before it asks,
+    /// and a master is given time to answer.
     pub(in crate::sim) fn joining_ns(&self) -> u64 {
         let joins_ns = 2 * u64::from(JOINING_SYNCS) * self.shape.interval_ns + DEAF_NS;
         joins_ns + if self.sealed { SEALED_JOINS_NS + SEALED_JOINS_CYCLES * self.shape.interval_ns } else { 0 }
