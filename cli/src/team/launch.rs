@@ -1,6 +1,6 @@
 //! `rohrpost team launch`: all robots of a team on this computer, and the arena in which they are simulated.
 
-use super::referee::{Referee, Verdict};
+use super::referee::{ArenaReferee, Verdict};
 use super::squad::{Squad, SquadFile, SquadNetwork};
 use crate::begin::demo::Folder;
 use crate::launch::LaunchedNodes;
@@ -86,7 +86,7 @@ fn watch(
             return Ok(None);
         }
     }
-    let mut referee = Referee::join(arena)?;
+    let mut referee = ArenaReferee::join(arena)?;
     let (began, mut told) = (Instant::now(), String::new());
     while nodes.watch(LOOK) && long.is_none_or(|long| began.elapsed() < long) {
         referee.look();

@@ -17,13 +17,13 @@ const ADD_INTRUDER: u16 = 16;
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// The arena, as a tool on its node has it.
-pub(crate) struct Referee {
+pub(crate) struct ArenaReferee {
     tool: ToolLink,
     arena: Name,
     pub(crate) state: ArenaState,
 }
 
-impl Referee {
+impl ArenaReferee {
     /// Takes part on the arena's node.
     pub(crate) fn join(installation: &Installation) -> Result<Self, Failure> {
         let name = installation.nodes.first().map(|node| node.name.clone()).unwrap_or_default();

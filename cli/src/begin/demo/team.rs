@@ -1,6 +1,6 @@
 //! `rohrpost demo --team 6`: robots that find each other without a server, wander, find an intruder and block it, while
-//! this command divides and joins their network, and kills a payload and their leader. Each is a system of its own, in a
-//! network namespace of its own; the arena in which they are simulated is another one.
+//! this command divides and joins their network, and kills a payload and their leader. Each is a system of its own, in
+//! a network namespace of its own; the arena in which they are simulated is another one.
 
 mod intruder;
 mod robots;
@@ -8,7 +8,7 @@ mod robots;
 use super::folder::Folder;
 use crate::launch::LaunchedNodes;
 use crate::team::launch::{all, lab};
-use crate::team::referee::{Referee, Verdict};
+use crate::team::referee::{ArenaReferee, Verdict};
 use crate::team::squad::{Squad, SquadFile, SquadNetwork};
 use crate::terminal::speech::Speech;
 use crate::terminal::table::table;
@@ -65,8 +65,8 @@ impl Event {
         }
     }
 
-    /// Beats until all tell the right leader and group; robots that are gone count for `AGE_BEATS`. None of an intruder:
-    /// it is to be found first.
+    /// Beats until all tell the right leader and group; robots that are gone count for `AGE_BEATS`. None of an
+    /// intruder: it is to be found first.
     fn promised(self) -> Option<u32> {
         let silence = match self {
             Self::Intruder => return None,
@@ -149,7 +149,7 @@ impl TeamRun {
                 return Ok(None);
             }
         }
-        let (mut robots, mut referee) = (join(&squad.robots)?, Referee::join(&squad.arena)?);
+        let (mut robots, mut referee) = (join(&squad.robots)?, ArenaReferee::join(&squad.arena)?);
         let (began, mut calm_since) = (Instant::now(), Instant::now() - PAUSE);
         while nodes.watch(LOOK) {
             // What is under way at the end has some time left.
@@ -183,7 +183,7 @@ impl TeamRun {
         Ok(Some(referee.leave()))
     }
 
-    fn note_blocked(&mut self, referee: &Referee, speech: &Speech) {
+    fn note_blocked(&mut self, referee: &ArenaReferee, speech: &Speech) {
         let came = self.happened.iter().find(|it| it.event == Event::Intruder);
         if let Some(came) = came.filter(|_| self.blocked.is_none() && referee.is_blocked()) {
             self.blocked = Some(came.since.elapsed());
@@ -238,7 +238,7 @@ impl Event {
         self,
         nodes: &mut LaunchedNodes<'_>,
         robots: &mut [TeamRobot],
-        referee: &mut Referee,
+        referee: &mut ArenaReferee,
     ) -> Result<(), Failure> {
         let half = robots.len() / 2;
         let far: Vec<String> = robots[half..].iter().map(|robot| robot.node.clone()).collect();
@@ -269,7 +269,7 @@ impl Event {
     }
 
     /// Beats until what is to come of it has come.
-    fn came_of_it(self, robots: &[TeamRobot], referee: &Referee) -> Option<(u32, Option<u32>)> {
+    fn came_of_it(self, robots: &[TeamRobot], referee: &ArenaReferee) -> Option<(u32, Option<u32>)> {
         let has_come = |views: Option<u32>| match self {
             Self::Intruder => referee.is_blocked(),
             _ => views.is_some() || self.promised_views().is_none(),

@@ -1,6 +1,6 @@
 //! Where the intruder of a team's demo comes.
 
-use crate::team::referee::Referee;
+use crate::team::referee::ArenaReferee;
 use crate::terminal::Failure;
 use rohrpost::interfaces::{ArenaRobot, TeamCell};
 use rohrpost_team::grid::{Cell, Direction, Map};
@@ -9,7 +9,7 @@ use rohrpost_team::grid::{Cell, Direction, Map};
 const APART_CELLS: u32 = 3;
 
 /// Puts an intruder near a robot, but not beside one, where it has two ways at least.
-pub(super) fn come(referee: &mut Referee, map: &str) -> Result<(), Failure> {
+pub(super) fn come(referee: &mut ArenaReferee, map: &str) -> Result<(), Failure> {
     let map = Map::read(map.as_bytes())?;
     let cell = place(&map, &referee.state.robots).ok_or("the map has no room for an intruder")?;
     let Cell { column, row } = cell;
