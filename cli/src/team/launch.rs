@@ -24,7 +24,8 @@ const MTU: u16 = 1500;
   rohrpost team launch config/team.toml --robots 30 --seconds 90
   rohrpost team launch config/team.toml --namespaces
 The file is that of one robot, with a section [team.launch]. While it runs: `rohrpost team --node robot2`, `rohrpost \
-log --node robot2`, `rohrpost team kill 4`. Ctrl-C ends all. Exit code 1: a robot did what robots must not.")]
+log --node robot2`, `rohrpost team kill 4`. Ctrl-C ends all. Exit code 1: a robot did what robots must not, or did \
+not end in order.")]
 pub(super) struct Arguments {
     /// The configuration of a robot.
     file: PathBuf,
