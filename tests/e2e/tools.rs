@@ -209,12 +209,16 @@ fn tools_say_what_to_do_while_nothing_runs() {
     let said = place.say(&["run", "mop", "--config", config.to_str().unwrap(), "--name", "output.0"]);
     assert_eq!(said.code, Some(2), "{said:?}");
     assert!(
-        said.err.contains("'mop'") && said.err.contains("sim, carmen, mapper, pilot, mischief, wormhole, team, output"),
+        said.err.contains("'mop'")
+            && said.err.contains("sim, carmen, mapper, pilot, mischief, wormhole, team, payload, arena, body, output"),
         "{said:?}"
     );
     let help = place.say(&["run", "--help"]).ok();
     let words: Vec<&str> = help.split_whitespace().collect();
-    assert!(words.join(" ").contains("sim, carmen, mapper, pilot, mischief, wormhole, team, output"), "{help}");
+    assert!(
+        words.join(" ").contains("sim, carmen, mapper, pilot, mischief, wormhole, team, payload, arena, body, output"),
+        "{help}"
+    );
     place.assert_empty();
 }
 

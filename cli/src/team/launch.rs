@@ -1,13 +1,12 @@
 //! `rohrpost team launch`: all robots of a team on this computer, and the arena in which they are simulated.
 
-use super::referee::Referee;
+use super::referee::{ArenaReferee, Verdict};
 use super::squad::{Squad, SquadFile, SquadNetwork};
 use crate::begin::demo::Folder;
 use crate::launch::LaunchedNodes;
 use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, say};
 use rohrpost_config::Installation;
-use rohrpost_routers::impair::ImpairmentSettings;
 use rohrpost_routers::lab::{Lab, NodeSpec, become_able};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,7 +24,8 @@ const MTU: u16 = 1500;
   rohrpost team launch config/team.toml --robots 30 --seconds 90
   rohrpost team launch config/team.toml --namespaces
 The file is that of one robot, with a section [team.launch]. While it runs: `rohrpost team --node robot2`, `rohrpost \
-log --node robot2`, `rohrpost team kill 4`. Ctrl-C ends all. Exit code 1: a robot did what robots must not.")]
+log --node robot2`, `rohrpost team kill 4`. Ctrl-C ends all. Exit code 1: a robot did what robots must not, or did \
+not end in order.")]
 pub(super) struct Arguments {
     /// The configuration of a robot.
     file: PathBuf,
@@ -35,9 +35,6 @@ pub(super) struct Arguments {
     /// Each robot gets a network namespace of its own.
     #[arg(long)]
     namespaces: bool,
-    /// Faults of the network between robots, as of `rohrpost launch`.
-    #[arg(long, value_name = "TEXT")]
-    impair: Option<ImpairmentSettings>,
     /// End after this many seconds.
     #[arg(long, value_name = "SECONDS")]
     seconds: Option<f64>,
@@ -52,13 +49,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     // Must run before the first thread; the speech has two.
     let lab = arguments.namespaces.then(|| lab(&squad)).transpose()?;
     let speech = Speech::begin()?;
-    let mut nodes = LaunchedNodes::begin(all(&squad), lab, arguments.impair, None, &speech)?;
+    let mut nodes = LaunchedNodes::begin(all(&squad), lab, None, None, &speech)?;
     let watched = watch(&mut nodes, &squad.arena, long, &speech);
     let code = nodes.stop();
     speech.settle();
-    let Some(referee) = watched? else { return Ok(ExitCode::FAILURE) };
-    say(referee.verdict());
-    Ok(if referee.is_well() { code } else { ExitCode::FAILURE })
+    let Some(verdict) = watched? else { return Ok(ExitCode::FAILURE) };
+    say(&verdict);
+    Ok(if verdict.is_well() { code } else { ExitCode::FAILURE })
 }
 
 /// The network of a team: each robot, and the arena, is a computer there.
@@ -84,13 +81,13 @@ fn watch(
     arena: &Installation,
     long: Option<Duration>,
     speech: &Speech,
-) -> Result<Option<Referee>, Failure> {
+) -> Result<Option<Verdict>, Failure> {
     while !nodes.all_run() {
         if !nodes.watch(Duration::MAX) {
             return Ok(None);
         }
     }
-    let mut referee = Referee::join(arena)?;
+    let mut referee = ArenaReferee::join(arena)?;
     let (began, mut told) = (Instant::now(), String::new());
     while nodes.watch(LOOK) && long.is_none_or(|long| began.elapsed() < long) {
         referee.look();
@@ -100,5 +97,5 @@ fn watch(
             told = verdict;
         }
     }
-    Ok(Some(referee))
+    Ok(Some(referee.leave()))
 }
