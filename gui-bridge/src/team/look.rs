@@ -16,6 +16,8 @@ pub(crate) struct Look {
     pub(super) colour: Rgb,
     pub(super) doing: Option<Doing>,
     pub(super) is_leader: bool,
+    /// It believes to be elsewhere, and so is drawn there, too.
+    pub(super) is_mistaken: bool,
     pub(super) label: String,
 }
 
@@ -28,6 +30,7 @@ impl Look {
             radius_m: radius_m.unwrap_or(RADIUS_M),
             colour: robot.colour(now_ns),
             doing,
+            is_mistaken: robot.mistaken().is_some(),
             is_leader: robot.group(now_ns).is_some_and(|(_, leader)| leader == id),
             label: format!("{id}{}", remark(doing, robot, now_ns)),
         }

@@ -35,17 +35,20 @@ impl Scene {
         let (look, mistaken, colour) =
             (Look::of(id, robot, self.time_ns), robot.mistaken(), robot.colour(self.time_ns));
         self.log(space("robot", id), &placed(&pose, 1.0));
-        if self.looks.get(&id) != Some(&look) {
+        let has_changed = self.looks.get(&id) != Some(&look);
+        if has_changed {
             self.look(id, &look);
             self.looks.insert(id, look);
         }
-        let strips = mistaken.map(|belief| belief_strips(&pose, &belief)).unwrap_or_default();
-        let belief = LineStrips3D::new(strips).with_radii([LINE_M / 2.0]).with_colors([colour]);
-        self.log(space("belief", id), &belief);
+        if has_changed || mistaken.is_some() {
+            let strips = mistaken.map(|belief| belief_strips(&pose, &belief)).unwrap_or_default();
+            let belief = LineStrips3D::new(strips).with_radii([LINE_M / 2.0]).with_colors([colour]);
+            self.log(space("belief", id), &belief);
+        }
     }
 
     fn look(&mut self, id: u8, look: &Look) {
-        let Look { radius_m, colour, doing, is_leader, label } = look;
+        let Look { radius_m, colour, doing, is_leader, label, .. } = look;
         let body = Cylinders3D::from_lengths_and_radii([HEIGHT_M], [*radius_m])
             .with_centers([[0.0, 0.0, HEIGHT_M / 2.0]])
             .with_colors([*colour])
