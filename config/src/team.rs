@@ -151,6 +151,8 @@ impl Team {
                 None
             }
         };
+        // For `rohrpost team launch` alone, which reads it.
+        section.get("launch");
         section.finish();
         let reach = reach.unwrap_or(TeamReach::Group(Ipv4Addr::UNSPECIFIED));
         Self { reach, keys, port, addresses }

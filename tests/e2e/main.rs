@@ -100,6 +100,7 @@ mod seer;
 mod set_clock;
 #[path = "../../mailbox/tests/common/small_memory.rs"]
 mod small_memory;
+mod squad;
 mod standby;
 mod start;
 mod strangers;

@@ -135,8 +135,8 @@ fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
     }
 }
 
-/// Launch's record of its configuration.
-fn noted_config(node: &Node) -> Result<(PathBuf, String), Failure> {
+/// Launch's record of its configuration, and the node's name.
+pub(crate) fn noted_config(node: &Node) -> Result<(PathBuf, String), Failure> {
     let told = |what: &str| format!("{}: its file `{CONFIG_FILE}` {what}; say --config FILE", node.path().display());
     let bytes = node.read_file(CONFIG_FILE)?.ok_or_else(|| told("is not there"))?;
     match bytes.split(|byte| *byte == b'\n').collect::<Vec<_>>()[..] {

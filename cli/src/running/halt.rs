@@ -20,6 +20,8 @@ use serde::de::DeserializeOwned;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+/// A supervisor is asked for so long, seconds.
+const TIMEOUT_S: f64 = 5.0;
 /// Functions of a supervisor.
 const HALT: u16 = 17;
 const RESUME: u16 = 18;
@@ -43,7 +45,7 @@ pub(crate) struct Which {
     #[arg(long = "as", value_name = "NAME")]
     holder: Option<String>,
     /// Ask for so long, seconds.
-    #[arg(long, default_value_t = 5.0, value_name = "SECONDS")]
+    #[arg(long, default_value_t = TIMEOUT_S, value_name = "SECONDS")]
     timeout: f64,
     /// Print JSON.
     #[arg(long)]
@@ -72,6 +74,19 @@ pub(crate) struct ResumeArguments {
     /// Let go what others hold, too. Ask them first.
     #[arg(long)]
     force: bool,
+}
+
+impl Which {
+    /// The robot of a node, asked by the person at this terminal.
+    fn on(target: Target) -> Self {
+        Self { target, all: false, holder: None, timeout: TIMEOUT_S, json: false }
+    }
+}
+
+/// Halts the robot of a node, or lets it go on that this person halted.
+pub(crate) fn halt_or_resume(target: Target, is_halt: bool) -> Result<ExitCode, Failure> {
+    let which = Which::on(target);
+    if is_halt { halt(&HaltArguments { which }) } else { resume(&ResumeArguments { which, force: false }) }
 }
 
 /// How it stands with one robot.

@@ -2,5 +2,9 @@
 
 pub(crate) mod entrances;
 mod ground;
+mod kill;
+pub(crate) mod launch;
 pub(crate) mod members;
 pub(crate) mod path;
+pub(crate) mod referee;
+pub(crate) mod squad;
