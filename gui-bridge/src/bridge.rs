@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 
 /// States and charts are drawn so often.
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
-/// What comes of other nodes, page by page, is taken so often; large streams are looked at no more often.
+/// What comes of other nodes and systems, page by page, is taken so often; large streams are looked at no more often.
 const COLLECT_PERIOD: Duration = Duration::from_millis(25);
 /// Data with a newest value that may wait while the bridge is stopped. Of more data, the least important are lost.
 const NEWEST_SLOTS: u16 = 64;
@@ -132,7 +132,9 @@ impl<V: Views> Module for Bridge<V> {
         let nodes = Nodes::new(node.clone(), &node_name, context.installation());
         // People look at it also while the robot's time stands still.
         context.use_computer_clock();
-        context.set_period(if nodes.are_several() { COLLECT_PERIOD } else { SURVEY_PERIOD });
+        let installation = context.installation();
+        let are_of_others = installation.gui.show.iter().any(|show| show.from.system() != installation.system.id);
+        context.set_period(if nodes.are_several() || are_of_others { COLLECT_PERIOD } else { SURVEY_PERIOD });
         Ok(Self {
             sink,
             rate_hz,

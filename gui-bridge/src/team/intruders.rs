@@ -25,7 +25,9 @@ impl Scene {
         let objects = self.team.objects(self.time_ns);
         let place = |object: &TeamObject| [object.x_m as f32, object.y_m as f32];
         let lines = objects.iter().map(|object| if object.certain { 0.035 } else { 0.012 });
-        let cages = Cylinders3D::from_lengths_and_radii(objects.iter().map(|_| CAGE_HEIGHT_M), [CAGE_M])
+        // A radius without a length would be a cylinder at the origin.
+        let (heights, radii) = objects.iter().map(|_| (CAGE_HEIGHT_M, CAGE_M)).unzip::<_, _, Vec<_>, Vec<_>>();
+        let cages = Cylinders3D::from_lengths_and_radii(heights, radii)
             .with_centers(objects.iter().map(place).map(|[x, y]| [x, y, CAGE_HEIGHT_M / 2.0]))
             .with_line_radii(lines)
             .with_colors(objects.iter().map(object_colour))
