@@ -1,6 +1,6 @@
 //! Teams that drive: robots with payload, wormhole and body as real processes, in an arena that referees them.
 
-use crate::harness::{Place, lacks_namespaces, until, wait};
+use crate::harness::{Place, lab, until, wait};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
@@ -21,10 +21,10 @@ fn a_team_from_one_file_finds_itself_stops_goes_on_and_loses_a_robot() {
         let state = asked(&place, "robot2", &["team"]);
         state["leader"] == 1 && state["group"] == 3 && state["views_equal"] == true
     });
-    let drives = |node| asked(&place, node, &["call", "wormhole.0", "state"])["mode"] == "active";
+    let drives = |node| asked(&place, node, &["call", "wormhole.0", "state"])["mode"] == "Active";
     until("payloads drive", || ["robot1", "robot2", "robot3"].into_iter().all(drives));
-    place.say(&["team", "stop"]).ok_with(["halted: 1.wormhole.0", "halted: 2.wormhole.0", "halted: 3.wormhole.0"]);
-    place.say(&["team", "resume"]).ok_with(["free: 1.wormhole.0", "free: 2.wormhole.0", "free: 3.wormhole.0"]);
+    place.say(&["team", "stop"]).ok_with(["robot1:\nhalted: wormhole.0", "robot2:\nhalted", "robot3:\nhalted"]);
+    place.say(&["team", "resume"]).ok_with(["robot1:\nfree: wormhole.0", "robot2:\nfree", "robot3:\nfree"]);
     place.say(&["team", "kill", "9"]).fails_with(["robot 9 does not run here"]);
     place.say(&["team", "kill", "2"]).ok_with(["killed", "processes of robot2"]);
     wait("the others miss it", || (asked(&place, "robot1", &["team"])["members"][0]["fresh"] == false).then_some(()));
@@ -32,6 +32,7 @@ fn a_team_from_one_file_finds_itself_stops_goes_on_and_loses_a_robot() {
     assert_eq!(team.end().code(), Some(1), "a robot did not end in order");
     let out = team.out();
     assert!(out.contains("\n0 touches by robots that moved towards what they touched, of 0 in all; "), "{out}");
+    place.say(&["clean"]).ok_with(["robot2"]);
     place.assert_empty();
 }
 
@@ -39,10 +40,14 @@ fn a_team_from_one_file_finds_itself_stops_goes_on_and_loses_a_robot() {
 #[test]
 fn eight_robots_block_an_intruder_and_touch_nothing() {
     let place = Place::new();
-    let said = place.say(&["demo", "--team", "8", "--seconds", "60"]);
-    if lacks_namespaces(&said.err) {
+    if lab([("one", "10.80.0.1"), ("two", "10.80.0.2")], "a team").is_none() {
         return;
     }
+    let mut demo = place.start(&["demo", "--team", "8", "--seconds", "60"]);
+    for words in ["all reachable entrances are held", "it is whole again", "the leader is back", "The demo "] {
+        demo.wait_for(words);
+    }
+    let said = demo.said();
     assert_eq!(said.code, Some(0), "{said:?}");
     let verdict = said.out.split_once("The demo went well.\n").unwrap_or_else(|| panic!("{said:?}")).1;
     assert!(verdict.starts_with("0 touches by robots that moved towards what they touched"), "{verdict}");

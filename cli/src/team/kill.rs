@@ -67,6 +67,7 @@ pub(super) fn halt_all(is_halt: bool) -> Result<ExitCode, Failure> {
         return Err("no robot with a wormhole runs here; `rohrpost team launch FILE` launches some".into());
     }
     for robot in robots {
+        say(format_args!("{}:", robot.name));
         let asked = halt_or_resume(Target::new(Some(robot.config), Some(robot.name)), is_halt)?;
         if asked != ExitCode::SUCCESS {
             code = asked;

@@ -1,13 +1,12 @@
 //! `rohrpost team launch`: all robots of a team on this computer, and the arena in which they are simulated.
 
-use super::referee::Referee;
+use super::referee::{Referee, Verdict};
 use super::squad::{Squad, SquadFile, SquadNetwork};
 use crate::begin::demo::{Folder, drawing, drawn};
 use crate::launch::LaunchedNodes;
 use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, say};
 use rohrpost_config::Installation;
-use rohrpost_routers::impair::ImpairmentSettings;
 use rohrpost_routers::lab::{Lab, NodeSpec, become_able};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -36,9 +35,6 @@ pub(super) struct Arguments {
     /// Each robot gets a network namespace of its own.
     #[arg(long)]
     namespaces: bool,
-    /// Faults of the network between robots, as of `rohrpost launch`.
-    #[arg(long, value_name = "TEXT")]
-    impair: Option<ImpairmentSettings>,
     /// Draw it in 3-D with Rerun: into this file, or a viewer's `rerun+http://HOST:PORT/proxy`.
     #[arg(long, value_name = "FILE")]
     draw: Option<String>,
@@ -58,14 +54,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let lab = arguments.namespaces.then(|| lab(&squad)).transpose()?;
     let speech = Speech::begin()?;
     let begun = SystemTime::now();
-    let mut nodes = LaunchedNodes::begin(all(&squad), lab, arguments.impair, None, &speech)?;
+    let mut nodes = LaunchedNodes::begin(all(&squad), lab, None, None, &speech)?;
     let watched = watch(&mut nodes, &squad.arena, long, &speech);
     let code = nodes.stop();
     speech.settle();
     drawn(drawing(&squad.arena), begun);
-    let Some(referee) = watched? else { return Ok(ExitCode::FAILURE) };
-    say(referee.verdict());
-    Ok(if referee.is_well() { code } else { ExitCode::FAILURE })
+    let Some(verdict) = watched? else { return Ok(ExitCode::FAILURE) };
+    say(&verdict);
+    Ok(if verdict.is_well() { code } else { ExitCode::FAILURE })
 }
 
 /// The network of a team: each robot, and the arena, is a computer there.
@@ -91,7 +87,7 @@ fn watch(
     arena: &Installation,
     long: Option<Duration>,
     speech: &Speech,
-) -> Result<Option<Referee>, Failure> {
+) -> Result<Option<Verdict>, Failure> {
     while !nodes.all_run() {
         if !nodes.watch(Duration::MAX) {
             return Ok(None);
@@ -107,5 +103,5 @@ fn watch(
             told = verdict;
         }
     }
-    Ok(Some(referee))
+    Ok(Some(referee.leave()))
 }

@@ -39,6 +39,8 @@ use std::time::Duration;
 const TRAFFIC: u16 = 4;
 const EVENT: u16 = 5;
 
+/// Beats at the start in which a robot that is lost is no news.
+const FIRST_BEATS: u64 = 4;
 /// Poses further from a scan are not of its moment.
 const POSE_GAP: Duration = Duration::from_millis(500);
 
@@ -132,7 +134,8 @@ impl Module for PayloadModule {
         self.payload.beat(now_ns);
         self.store.keep(context, self.payload.team().group().version().incarnation);
         self.serve(context);
-        let complaint = self.payload.lost().map(|cause| format!("lost, and stands: {cause}"));
+        let lost = self.payload.lost().filter(|_| self.beats.told().beats > FIRST_BEATS);
+        let complaint = lost.map(|cause| format!("lost, and stands: {cause}"));
         let [messages, promises] = &self.trouble;
         context.complain(complaint.unwrap_or_else(|| if promises.is_empty() { messages } else { promises }.clone()));
         let state = state::of(&self.payload, self.beats.told());

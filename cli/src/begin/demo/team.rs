@@ -9,7 +9,7 @@ use super::folder::Folder;
 use super::gui::{drawing, drawn};
 use crate::launch::LaunchedNodes;
 use crate::team::launch::{all, lab};
-use crate::team::referee::Referee;
+use crate::team::referee::{Referee, Verdict};
 use crate::team::squad::{Squad, SquadFile, SquadNetwork};
 use crate::terminal::speech::Speech;
 use crate::terminal::table::table;
@@ -27,7 +27,7 @@ const DRAWING: &str = "rohrpost-demo.rrd";
 /// States are looked at so often.
 const LOOK: Duration = Duration::from_millis(100);
 /// Between agreement and the next event.
-const PAUSE: Duration = Duration::from_secs(2);
+const PAUSE: Duration = Duration::from_secs(1);
 /// What is not agreed by then is not waited for.
 const LONGEST: Duration = Duration::from_secs(15);
 /// An intruder that is not blocked by then is not waited for.
@@ -68,16 +68,20 @@ impl Event {
         }
     }
 
-    /// Beats until all tell the right leader and group, and that views are equal; robots that are gone count for
-    /// `AGE_BEATS`. None of an intruder: it is to be found first.
-    fn promised(self) -> Option<[u32; 2]> {
+    /// Beats until all tell the right leader and group; robots that are gone count for `AGE_BEATS`. None of an intruder:
+    /// it is to be found first.
+    fn promised(self) -> Option<u32> {
         let silence = match self {
             Self::Intruder => return None,
             Self::Divide | Self::KillLeader => AGE_BEATS,
             Self::Begin | Self::Join | Self::KillPayload | Self::LeaderBack => 0,
         };
-        let group = silence + MERGE_BEATS + LOOK_BEATS;
-        Some([group, group + VIEW_BEATS + HEAR_BEATS])
+        Some(silence + MERGE_BEATS + LOOK_BEATS)
+    }
+
+    /// Beats until all tell that views are equal. Each look at an intruder changes views, so nothing is promised then.
+    fn promised_views(self) -> Option<u32> {
+        self.promised().filter(|_| self == Self::Begin).map(|group| group + VIEW_BEATS + HEAR_BEATS)
     }
 
     /// How long is waited for what is to come of it.
@@ -91,8 +95,8 @@ struct TeamHappening {
     event: Event,
     at: Duration,
     since: Instant,
-    /// Beats until all told the right leader and group, and that views are equal.
-    beats: Option<[u32; 2]>,
+    /// Beats until all told the right leader and group, and that views are equal, if they were then.
+    beats: Option<(u32, Option<u32>)>,
 }
 
 pub(super) fn run(count: u8, long: Option<Duration>, has_gui: bool) -> Result<ExitCode, Failure> {
@@ -112,13 +116,13 @@ pub(super) fn run(count: u8, long: Option<Duration>, has_gui: bool) -> Result<Ex
     let watched = run.watch(&mut nodes, &squad, &speech, long);
     let code = nodes.stop();
     speech.settle();
-    let referee = watched?;
+    let verdict = watched?;
     let is_all = run.happened.len() == Event::ALL.len();
     let is_kept = run.happened.iter().all(TeamHappening::is_kept);
-    let is_well = referee.as_ref().is_some_and(|referee| referee.is_well() && referee.is_blocked());
+    let is_well = verdict.as_ref().is_some_and(|verdict| verdict.has_no_touch() && verdict.is_blocked());
     say(if is_all && is_kept && is_well { "The demo went well." } else { "The demo did not go well." });
-    if let Some(referee) = &referee {
-        say(referee.verdict());
+    if let Some(verdict) = &verdict {
+        say(verdict);
     }
     if !is_all {
         let missing = Event::ALL[run.happened.len()..].iter().map(|event| event.text());
@@ -147,7 +151,7 @@ impl TeamRun {
         squad: &Squad,
         speech: &Speech,
         long: Option<Duration>,
-    ) -> Result<Option<Referee>, Failure> {
+    ) -> Result<Option<Verdict>, Failure> {
         while !nodes.all_run() {
             if !nodes.watch(Duration::MAX) {
                 return Ok(None);
@@ -156,7 +160,9 @@ impl TeamRun {
         let (mut robots, mut referee) = (join(&squad.robots)?, Referee::join(&squad.arena)?);
         let (began, mut calm_since) = (Instant::now(), Instant::now() - PAUSE);
         while nodes.watch(LOOK) {
-            let is_over = long.is_some_and(|long| began.elapsed() >= long);
+            // What is under way at the end has some time left.
+            let is_late = || began.elapsed() >= long.unwrap_or_default() + LONGEST;
+            let is_over = long.is_some_and(|long| began.elapsed() >= long && (referee.is_blocked() || is_late()));
             robots.iter_mut().for_each(TeamRobot::look);
             referee.look();
             if let Some(now) = self.happened.last_mut().filter(|last| last.is_under_way()) {
@@ -182,7 +188,7 @@ impl TeamRun {
             self.beats.latest_us = self.beats.latest_us.max(told.latest_us);
         }
         robots.into_iter().for_each(TeamRobot::leave);
-        Ok(Some(referee))
+        Ok(Some(referee.leave()))
     }
 
     fn note_blocked(&mut self, referee: &Referee, speech: &Speech) {
@@ -196,11 +202,11 @@ impl TeamRun {
     /// A row for each event.
     fn told(&self) -> String {
         let row = |it: &TeamHappening| {
-            let beats = it.beats.map(|beats| beats.map(|beats| beats.to_string()));
-            let [group, views] = beats.unwrap_or_else(|| ["never".into(), "never".into()]);
-            let promised = it.event.promised().map(|most| most.map(|most| most.to_string()));
-            let [group_most, views_most] = promised.unwrap_or_default();
-            [format!("{:.1} s", it.at.as_secs_f64()), it.event.text().into(), group, group_most, views, views_most]
+            let number = |beats: Option<u32>| beats.map(|beats| beats.to_string()).unwrap_or_default();
+            let group = it.beats.map_or_else(|| "never".into(), |(group, _)| group.to_string());
+            let (at, views) = (format!("{:.1} s", it.at.as_secs_f64()), it.beats.and_then(|(_, views)| views));
+            let (group_most, views_most) = (number(it.event.promised()), number(it.event.promised_views()));
+            [at, it.event.text().into(), group, group_most, number(views), views_most]
         };
         let heads = [">at", "what happened", ">group after beats", ">promised", ">equal views", ">promised"];
         let blocked = self.blocked.map_or_else(
@@ -214,7 +220,7 @@ impl TeamRun {
             "{}{blocked}\n{beats} beats: {over_10_ms} late by more than 10 ms, {over_50_ms} by more than 50 ms, the \
              latest by {:.1} ms\nPromised without loss: {MERGE_BEATS} beats until all know leader and group, \
              {VIEW_BEATS} more until views are equal, {HEAR_BEATS} until all have heard that, {LOOK_BEATS} until they \
-             tell it; {AGE_BEATS} before where robots fell silent.",
+             tell it; {AGE_BEATS} before where robots fell silent. Each look at an intruder changes views.",
             table(heads, self.happened.iter().map(row)),
             latest_us as f64 / 1e3,
         )
@@ -227,8 +233,10 @@ impl TeamHappening {
     }
 
     fn is_kept(&self) -> bool {
-        let is_kept = |beats: [u32; 2], most: [u32; 2]| beats.into_iter().zip(most).all(|(beats, most)| beats <= most);
-        self.beats.is_some_and(|beats| self.event.promised().is_none_or(|most| is_kept(beats, most)))
+        let is_kept =
+            |beats: Option<u32>, most: Option<u32>| most.is_none_or(|most| beats.is_some_and(|it| it <= most));
+        let (promised, views_promised) = (self.event.promised(), self.event.promised_views());
+        self.beats.is_some_and(|(group, views)| is_kept(Some(group), promised) && is_kept(views, views_promised))
     }
 }
 
@@ -269,18 +277,22 @@ impl Event {
     }
 
     /// Beats until what is to come of it has come.
-    fn came_of_it(self, robots: &[TeamRobot], referee: &Referee) -> Option<[u32; 2]> {
-        agreed(robots).filter(|_| self != Self::Intruder || referee.is_blocked())
+    fn came_of_it(self, robots: &[TeamRobot], referee: &Referee) -> Option<(u32, Option<u32>)> {
+        let has_come = |views: Option<u32>| match self {
+            Self::Intruder => referee.is_blocked(),
+            _ => views.is_some() || self.promised_views().is_none(),
+        };
+        agreed(robots).filter(|(_, views)| has_come(*views))
     }
 }
 
-/// Beats of the slowest robots, if all are right: each part of the network is one group with equal views.
-fn agreed(robots: &[TeamRobot]) -> Option<[u32; 2]> {
+/// Beats of the slowest robots, if all are right: each part of the network is one group. `None` of views that differ.
+fn agreed(robots: &[TeamRobot]) -> Option<(u32, Option<u32>)> {
     let alive = || robots.iter().filter(|robot| robot.is_alive());
     let part = |part| alive().filter(move |robot| robot.part == part).map(|robot| robot.id).collect::<Vec<u8>>();
     let parts = [part(0), part(1)];
-    alive().try_fold([0; 2], |[group, views], robot| {
-        let [own_group, own_views] = robot.agrees_since(&parts[robot.part])?;
-        Some([own_group.max(group), own_views.max(views)])
+    alive().try_fold((0, Some(0)), |(group, views), robot| {
+        let (own_group, own_views) = robot.agrees_since(&parts[robot.part])?;
+        Some((own_group.max(group), views.zip(own_views).map(|(views, own)| own.max(views))))
     })
 }

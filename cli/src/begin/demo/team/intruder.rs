@@ -2,12 +2,9 @@
 
 use crate::team::referee::Referee;
 use crate::terminal::Failure;
-use rohrpost::interfaces::{ArenaConduct, ArenaInterface, ArenaRefusal, ArenaRobot, TeamCell};
-use rohrpost::wire::{append, from_bytes};
+use rohrpost::interfaces::{ArenaRobot, TeamCell};
 use rohrpost_team::grid::{Cell, Direction, Map};
 
-/// The function of an arena that adds an intruder.
-const ADD_INTRUDER: u16 = 16;
 /// Cells between the intruder and the nearest robot, at least.
 const APART_CELLS: u32 = 3;
 
@@ -16,10 +13,7 @@ pub(super) fn come(referee: &mut Referee, map: &str) -> Result<(), Failure> {
     let map = Map::read(map.as_bytes())?;
     let cell = place(&map, &referee.state.robots).ok_or("the map has no room for an intruder")?;
     let Cell { column, row } = cell;
-    let write = |body: &mut Vec<u8>| append(body, &(TeamCell { column, row }, ArenaConduct::Stands));
-    let read = |bytes: &[u8]| from_bytes::<Result<u32, ArenaRefusal>>(bytes);
-    referee.tool.call(referee.arena, ADD_INTRUDER, ArenaInterface::hash(), write, read)??;
-    Ok(())
+    referee.add_intruder(TeamCell { column, row })
 }
 
 fn place(map: &Map, robots: &[ArenaRobot]) -> Option<Cell> {

@@ -103,17 +103,18 @@ impl TeamRobot {
         self.since = self.state.as_ref().map_or((0, 0), |state| (state.incarnation, state.counter));
     }
 
-    /// In which beat, counted from then, the robot knew its group, and in which that all views are equal; `None` as
-    /// long as it does not.
-    pub(super) fn agrees_since(&self, all: &[u8]) -> Option<[u32; 2]> {
-        let state = self.state.as_ref().filter(|state| state.differs_ms.is_none())?;
+    /// In which beat, counted from then, the robot knew its group, and in which that all views are equal, if they are;
+    /// `None` as long as it does not know its group.
+    pub(super) fn agrees_since(&self, all: &[u8]) -> Option<(u32, Option<u32>)> {
+        let state = self.state.as_ref()?;
         let fresh = state.members.iter().filter(|member| member.fresh).map(|member| member.robot);
         let mut group: Vec<u8> = fresh.chain([state.robot]).collect();
         group.sort_unstable();
         let ends = (Some(&state.leader), Some(&state.group));
         let (run, counter) = self.since;
         let before = if state.incarnation == run { counter } else { 0 };
-        let since = [state.settled, state.views_settled].map(|number| number.saturating_sub(before));
-        (group == all && ends == (all.first(), all.last())).then_some(since)
+        let views = state.differs_ms.is_none().then(|| state.views_settled.saturating_sub(before));
+        let is_right = group == all && ends == (all.first(), all.last());
+        is_right.then(|| (state.settled.saturating_sub(before), views))
     }
 }
