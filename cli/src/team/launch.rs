@@ -2,7 +2,7 @@
 
 use super::referee::{ArenaReferee, Verdict};
 use super::squad::{Squad, SquadFile, SquadNetwork};
-use crate::begin::demo::Folder;
+use crate::begin::demo::{Folder, drawing, drawn};
 use crate::launch::LaunchedNodes;
 use crate::terminal::speech::Speech;
 use crate::terminal::{Failure, say};
@@ -11,7 +11,7 @@ use rohrpost_routers::lab::{Lab, NodeSpec, become_able};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// The referee is asked so often.
 const LOOK: Duration = Duration::from_millis(500);
@@ -23,6 +23,7 @@ const MTU: u16 = 1500;
   rohrpost team launch config/team.toml
   rohrpost team launch config/team.toml --robots 30 --seconds 90
   rohrpost team launch config/team.toml --namespaces
+  rohrpost team launch config/team.toml --draw team.rrd
 The file is that of one robot, with a section [team.launch]. While it runs: `rohrpost team --node robot2`, `rohrpost \
 log --node robot2`, `rohrpost team kill 4`. Ctrl-C ends all. Exit code 1: a robot did what robots must not, or did \
 not end in order.")]
@@ -35,6 +36,9 @@ pub(super) struct Arguments {
     /// Each robot gets a network namespace of its own.
     #[arg(long)]
     namespaces: bool,
+    /// Draw it in 3-D with Rerun: into this file, or a viewer's `rerun+http://HOST:PORT/proxy`.
+    #[arg(long, value_name = "FILE")]
+    draw: Option<String>,
     /// End after this many seconds.
     #[arg(long, value_name = "SECONDS")]
     seconds: Option<f64>,
@@ -42,17 +46,20 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let long = arguments.seconds.map(crate::terminal::units::seconds).transpose()?;
-    let file = SquadFile::read(&arguments.file)?;
+    let mut file = SquadFile::read(&arguments.file)?;
+    arguments.draw.iter().try_for_each(|to| file.draw(to))?;
     let folder = Folder::new()?;
     let network = if arguments.namespaces { SquadNetwork::Namespaces } else { SquadNetwork::Loopback };
     let squad = file.write(arguments.robots, network, folder.path())?;
     // Must run before the first thread; the speech has two.
     let lab = arguments.namespaces.then(|| lab(&squad)).transpose()?;
     let speech = Speech::begin()?;
+    let begun = SystemTime::now();
     let mut nodes = LaunchedNodes::begin(all(&squad), lab, None, None, &speech)?;
     let watched = watch(&mut nodes, &squad.arena, long, &speech);
     let code = nodes.stop();
     speech.settle();
+    drawn(drawing(&squad.arena), begun);
     let Some(verdict) = watched? else { return Ok(ExitCode::FAILURE) };
     say(&verdict);
     Ok(if verdict.is_well() { code } else { ExitCode::FAILURE })

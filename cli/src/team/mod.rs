@@ -1,5 +1,6 @@
 //! Commands for teams of robots: what they know of each other, and what they plan on the grid of a map.
 
+pub(crate) mod drawing;
 pub(crate) mod entrances;
 mod ground;
 mod kill;

@@ -3,6 +3,7 @@
 //! Robots differ in number, names, address, place and seed. All paths stay those of the file; the arena's socket is in
 //! the folder of the new files.
 
+use super::drawing::{TeamDrawing, add_class};
 use crate::begin::check;
 use crate::terminal::Failure;
 use rohrpost_config::Installation;
@@ -67,6 +68,8 @@ pub(crate) struct SquadFile {
     folder: PathBuf,
     document: DocumentMut,
     launch: TeamLaunch,
+    /// Where it is drawn, if at all.
+    drawing: Option<TeamDrawing>,
 }
 
 /// The systems of a team.
@@ -123,7 +126,17 @@ impl SquadFile {
             )
         };
         let launch = file.team.and_then(|team| team.launch).ok_or_else(missing)?;
-        Ok(Self { shown: shown.into(), folder, document: text.parse()?, launch })
+        Ok(Self { shown: shown.into(), folder, document: text.parse()?, launch, drawing: None })
+    }
+
+    /// All robots are drawn: into a file, or a viewer, see [`TeamDrawing::new`].
+    ///
+    /// # Errors
+    /// The present folder is gone, or the file has no classes.
+    pub(crate) fn draw(&mut self, to: &str) -> Result<(), Failure> {
+        self.drawing = Some(TeamDrawing::new(to)?);
+        add_class(self.document["classes"].as_table_like_mut().ok_or("no [classes]")?);
+        Ok(())
     }
 
     /// Writes the files into `to`, and reads them as a user's.
@@ -142,7 +155,7 @@ impl SquadFile {
             installation.shown = format!("{} of {name}", self.shown).into();
             Ok::<_, Failure>(Arc::new(installation))
         };
-        let arena = load(ARENA, &self.arena(count)?)?;
+        let arena = load(ARENA, &self.arena(count, network)?)?;
         let robots =
             (1..=count).map(|id| load(&node_name(id), &self.robot(id, network)?)).collect::<Result<_, Failure>>()?;
         Ok(Squad { robots, arena })
@@ -157,10 +170,7 @@ impl SquadFile {
         let node = node_name(id);
         document["system"]["name"] = value(&node);
         document["system"]["id"] = value(i64::from(id));
-        let team = document["team"].as_table_like_mut().ok_or("no [team]")?;
-        team.remove("launch");
-        team.insert("address", value(network.address(id).to_string()));
-        self.keep_path(team, "keys");
+        document["team"] = Item::Table(self.way(id, network)?);
         rename_node(&mut document, &node)?;
         let modules = document["module"].as_array_of_tables_mut().ok_or("no [[module]]")?;
         for module in modules.iter_mut() {
@@ -180,6 +190,15 @@ impl SquadFile {
         Ok(document)
     }
 
+    /// The section `[team]` of a system.
+    fn way(&self, id: u8, network: SquadNetwork) -> Result<Table, Failure> {
+        let mut way = self.document["team"].as_table().ok_or("no [team]")?.clone();
+        way.remove("launch");
+        way.insert("address", value(network.address(id).to_string()));
+        self.keep_path(&mut way, "keys");
+        Ok(way)
+    }
+
     /// A path of the file stays one of its folder.
     fn keep_path(&self, table: &mut dyn TableLike, key: &str) {
         if let Some(path) = table.get(key).and_then(Item::as_str).map(|path| self.folder.join(path)) {
@@ -187,7 +206,7 @@ impl SquadFile {
         }
     }
 
-    fn arena(&self, count: u8) -> Result<DocumentMut, Failure> {
+    fn arena(&self, count: u8, network: SquadNetwork) -> Result<DocumentMut, Failure> {
         let mut settings: Table = toml::to_string(&self.launch.arena)?.parse::<DocumentMut>()?.as_table().clone();
         self.keep_path(&mut settings, "map");
         let map = settings.get("map").and_then(Item::as_str).ok_or("[team.launch]: `arena` has no `map`")?;
@@ -205,7 +224,7 @@ impl SquadFile {
         nodes.insert(ARENA, toml_edit::table());
         document["nodes"] = Item::Table(nodes);
         let mut modules = ArrayOfTables::new();
-        for (name, builtin, settings) in [("output.0", "output", None), ("arena.0", ARENA, Some(settings))] {
+        for (name, builtin, settings) in [("output.0", "output", None), ("arena.0", ARENA, Some(settings.clone()))] {
             let mut module = Table::new();
             module.insert("name", value(name));
             module.insert("builtin", value(builtin));
@@ -213,6 +232,9 @@ impl SquadFile {
             modules.push(module);
         }
         document["module"] = Item::ArrayOfTables(modules);
+        if let Some(drawing) = &self.drawing {
+            drawing.add(&mut document, &settings, self.way(ARENA_ID, network)?, &self.document, count)?;
+        }
         Ok(document)
     }
 

@@ -224,11 +224,10 @@ impl Payload {
 
     /// Cells to which it goes, as far as they are planned: the next one first.
     pub fn way(&self) -> Vec<Cell> {
-        let navigation = &self.state.navigation;
-        let destination = navigation.destination.map(|(cell, _)| cell);
-        let mut way: Vec<Cell> = navigation.next.into_iter().chain(destination).collect();
-        way.dedup();
-        way
+        match &self.state.traffic {
+            Some(traffic) => traffic.way(),
+            None => self.state.navigation.next.into_iter().collect(),
+        }
     }
 
     /// The floor on which it drives.

@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     /// block it. Their network is divided and joined, a payload and the leader's computer are killed; a referee says
     /// whether a robot touched anything, and a table after how many beats all agreed.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=60), conflicts_with_all = ["nodes",
-        "log", "config", "record", "viewer", "no_gui", "gui_build"])]
+        "log", "config", "record", "viewer", "gui_build"])]
     pub(super) team: Option<u8>,
     /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that
     /// are reached only by TCP, a loss becomes a delay of that package and of all packages behind it.

@@ -6,6 +6,7 @@ mod intruder;
 mod robots;
 
 use super::folder::Folder;
+use super::gui::{drawing, drawn};
 use crate::launch::LaunchedNodes;
 use crate::team::launch::{all, lab};
 use crate::team::referee::{ArenaReferee, Verdict};
@@ -16,11 +17,13 @@ use crate::terminal::{Failure, say};
 use robots::{AGE_BEATS, TeamRobot, join};
 use rohrpost::interfaces::PayloadBeats;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// The file of the first robot, and the map that it names.
 const TEAM: &str = include_str!("../../../../config/team.toml");
 const HALL: &str = include_str!("../../../../config/hall.map");
+/// What it is drawn into, as in other demos.
+const DRAWING: &str = "rohrpost-demo.rrd";
 /// States are looked at so often.
 const LOOK: Duration = Duration::from_millis(100);
 /// Between agreement and the next event.
@@ -96,14 +99,18 @@ struct TeamHappening {
     beats: Option<(u32, Option<u32>)>,
 }
 
-pub(super) fn run(count: u8, long: Option<Duration>) -> Result<ExitCode, Failure> {
+pub(super) fn run(count: u8, long: Option<Duration>, has_gui: bool) -> Result<ExitCode, Failure> {
     let folder = Folder::new()?;
     std::fs::write(folder.path().join("hall.map"), HALL)?;
-    let file = SquadFile::parse(TEAM, "built-in team.toml", folder.path().to_owned())?;
+    let mut file = SquadFile::parse(TEAM, "built-in team.toml", folder.path().to_owned())?;
+    if has_gui {
+        file.draw(DRAWING)?;
+    }
     let squad = file.write(Some(count), SquadNetwork::Namespaces, folder.path())?;
     // Must run before the first thread; the speech has two.
     let lab = lab(&squad)?;
     let speech = Speech::begin()?;
+    let begun = SystemTime::now();
     let mut nodes = LaunchedNodes::begin(all(&squad), lab, None, None, &speech)?;
     let mut run = TeamRun { happened: Vec::new(), blocked: None, beats: PayloadBeats::default() };
     let watched = run.watch(&mut nodes, &squad, &speech, long);
@@ -122,6 +129,7 @@ pub(super) fn run(count: u8, long: Option<Duration>) -> Result<ExitCode, Failure
         say(format_args!("no time for: {}", missing.collect::<Vec<_>>().join(", ")));
     }
     say(format_args!("\n{}", run.told()));
+    drawn(drawing(&squad.arena), begun);
     Ok(if is_all && is_kept && is_well { code } else { ExitCode::FAILURE })
 }
 

@@ -130,6 +130,11 @@ impl Traffic {
         self.claims.entering().filter(|_| !self.stands_still())
     }
 
+    /// Cells to which the robot goes by the plan, the next one first; empty without a plan.
+    pub fn way(&self) -> Vec<Cell> {
+        self.plan.as_ref().map(|agreed| agreed.plan.way(self.me, self.moment)).unwrap_or_default()
+    }
+
     /// What the robot has to do about intruders, and what the others do; `None` without one, or without a plan.
     pub fn sharing(&self) -> Option<&Sharing> {
         self.plan.as_ref().and_then(|agreed| agreed.plan.sharing.as_ref())

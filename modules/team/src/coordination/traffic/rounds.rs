@@ -116,6 +116,17 @@ impl RoundPlan {
         self.robots.iter().enumerate().all(has_left).then_some((cell, next as u32))
     }
 
+    /// Cells to which a robot goes after a moment, the next one first.
+    pub(super) fn way(&self, me: RobotId, mut moment: u32) -> Vec<Cell> {
+        let Ok(at) = self.robots.binary_search(&me) else { return Vec::new() };
+        let steps = std::iter::from_fn(|| {
+            let (next, cell) = self.step_after(at, moment)?;
+            moment = next as u32;
+            Some(cell)
+        });
+        steps.collect()
+    }
+
     /// Whether the plan has a robot in this cell at a moment, if it has the robot at all.
     pub(super) fn is_at(&self, me: RobotId, moment: u32, cell: Cell) -> bool {
         let at = self.robots.binary_search(&me).ok();
