@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 /// One mistake in a configuration file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Line in the text, counted from 1: that of the file, or of what it resolved to; none if the file could not be read at all.
+    /// Line in the text, counted from 1: that of the file, or of what it resolved to; none if the file could not be
+    /// read at all.
     pub line: Option<usize>,
     /// The mistake and its remedy.
     pub message: String,

@@ -30,7 +30,8 @@
 //! ```
 //!
 //! Each section has a file that reads and checks it and words its mistakes (`module`, `classes`, `flow`, `tdma` …);
-//! `errors` prints them, `sources` joins the files that one includes, `reader` words wrong types and unknown keys. `config/tests/broken` has an example of each.
+//! `errors` prints them, `sources` joins the files that one includes, `reader` words wrong types and unknown keys.
+//! `config/tests/broken` has an example of each.
 //!
 //! Every key of the file is described in `docs/src/configuration.md`.
 #![forbid(unsafe_code)]

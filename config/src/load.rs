@@ -39,8 +39,8 @@ impl Installation {
         Ok(installation)
     }
 
-    /// Checks the text of one file, or what [`resolved_text`] made of several; `path` is its name in messages and the place that relative paths start from. Saved
-    /// parameters and files of hosts are not read.
+    /// Checks the text of one file, or what [`resolved_text`] made of several; `path` is its name in messages and the
+    /// place that relative paths start from. Saved parameters and files of hosts are not read.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Errors> {
         let reader = Reader::new(text);
         let (document, syntax) = DeTable::parse_recoverable(text);

@@ -22,7 +22,7 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
     let after: &[&str] = match command {
         "list" | "status" | "log" => &[],
         "top" => &["--once", "--interval", "0.1"],
-        "graph" => &["--seconds", "0.1"],
+        "graph" | "data" => &["--seconds", "0.1"],
         "call" | "mailbox" | "hz" | "bw" | "delay" | "ping" | "restart" | "stop" | "start" => &["probe.0"],
         "echo" => &["probe.0", "beat"],
         "send" => &["probe.0", "count", "1", "--count", "1"],

@@ -39,7 +39,7 @@ pub(super) struct Table {
     pub(super) entries: Vec<(String, Value)>,
 }
 
-/// Whose values count.
+/// Which values count.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Rule {
     /// The newer ones: they are of the file that includes.

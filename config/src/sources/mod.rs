@@ -34,7 +34,7 @@ pub fn resolved_text(path: &Path) -> Result<String, Errors> {
 /// As [`resolved_text`], with this environment.
 pub(crate) fn resolved_with(path: &Path, variable: impl Fn(&str) -> Option<String>) -> Result<String, Errors> {
     let sources = read::Sources::read(path)?;
-    if sources.is_alone() && !sources.has_variables() {
+    if sources.is_alone() && !sources.tables().any(variables::is_any) {
         return Ok(sources.into_text());
     }
     let mut merged = sources.merged()?;

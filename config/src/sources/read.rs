@@ -91,9 +91,9 @@ impl Sources {
         self.files.len() == 1
     }
 
-    /// Whether a value may come from the environment.
-    pub(super) fn has_variables(&self) -> bool {
-        self.files.iter().any(|file| super::variables::is_any(&file.table))
+    /// What each file says itself.
+    pub(super) fn tables(&self) -> impl Iterator<Item = &Table> {
+        self.files.iter().map(|file| &file.table)
     }
 
     pub(super) fn into_text(self) -> String {

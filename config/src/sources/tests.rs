@@ -15,7 +15,7 @@ tool = { id = 16 }
 [[module]]
 name = "motor.0"
 program = "./motor"
-settings = { port = { env = "P7_PORT", or = "/dev/ttyUSB0" }, speed-m-s = 0.5 }
+settings = { port = { env = "MOTOR_PORT", or = "/dev/ttyUSB0" }, speed-m-s = 0.5 }
 "#;
 
 struct Folder(tempfile::TempDir);
@@ -56,10 +56,12 @@ fn a_robot_says_its_differences_alone() {
     assert_eq!(installation.place(motor.line), (folder.path("common.toml"), 10));
     assert_eq!(installation.place(installation.modules[1].line), (folder.path("seven.toml"), 6));
     assert_eq!(installation.included().collect::<Vec<_>>(), [folder.path("common.toml")]);
+    let variable = installation.text.lines().position(|line| line.contains("$MOTOR_PORT")).unwrap();
+    assert_eq!(installation.place(variable + 1), (folder.path("common.toml"), 13));
     let text = folder.text("seven.toml", Some("/dev/ttyACM3")).unwrap();
     for line in [
         "installation = \"seven\" #@ seven.toml:2",
-        "port = \"/dev/ttyACM3\" #@ common.toml:13 by $P7_PORT",
+        "port = \"/dev/ttyACM3\" #@ common.toml:13 by $MOTOR_PORT",
         "speed-m-s = 0.3 #@ seven.toml:5",
         "motor = { id = 200, text = \"Drives\" } #@ common.toml:7",
     ] {
@@ -70,7 +72,7 @@ fn a_robot_says_its_differences_alone() {
 
 #[test]
 fn the_digest_is_of_what_it_resolves_to() {
-    let whole = COMMON.replace("{ env = \"P7_PORT\", or = \"/dev/ttyUSB0\" }", "\"/dev/ttyUSB0\"");
+    let whole = COMMON.replace("{ env = \"MOTOR_PORT\", or = \"/dev/ttyUSB0\" }", "\"/dev/ttyUSB0\"");
     let folder =
         Folder::new(&[("common.toml", COMMON), ("own.toml", "include = [\"common.toml\"]"), ("whole.toml", &whole)]);
     let digests = ["own.toml", "whole.toml"].map(|name| folder.read(name).unwrap().digest());

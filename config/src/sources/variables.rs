@@ -1,7 +1,8 @@
 //! Values from the environment: `{ env = "LASER_PORT", or = "/dev/ttyUSB0" }`.
 //!
-//! They stand where nodes may differ: in the settings of modules, and where a node writes its own files. What nodes must
-//! agree on never comes from an environment. Programs without the variable, such as tools in another shell, read `or`.
+//! They stand where nodes may differ: in the settings of modules, and where a node writes its own files. What nodes
+//! must agree on never comes from an environment. Programs without the variable, such as tools in another shell, read
+//! `or`.
 
 use super::merge::{Table, Value, Written};
 use super::read::Sources;

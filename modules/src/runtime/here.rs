@@ -21,7 +21,7 @@ pub enum NotHere {
     /// Others run.
     #[error("no installation `{0}` runs here; there are: {1}")]
     NoSuch(String, String),
-    /// It is not clear which one is meant.
+    /// Several run, and none of them is named.
     #[error("several installations run here: {0}")]
     Several(String),
     /// The configuration has no node.

@@ -136,8 +136,10 @@ fn missing_programs(installation: &Installation, only: Option<&str>) -> Result<V
 /// A file with mistakes.
 pub(super) fn errors_json(errors: &Errors) -> Value {
     let file = errors.path().display().to_string();
-    let problem = |(file, line, message): (PathBuf, Option<usize>, String)| json!({ "file": file.display().to_string(), "line": line, "message": message });
-    let problems: Vec<Value> = errors.placed().map(problem).collect();
+    let mut problems = Vec::new();
+    for (path, line, message) in errors.placed() {
+        problems.push(json!({ "file": path.display().to_string(), "line": line, "message": message }));
+    }
     json!({ "file": file, "right": false, "errors": problems })
 }
 

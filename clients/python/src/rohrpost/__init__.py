@@ -25,6 +25,6 @@ __all__ = [
     "F32", "F64", "Fault", "FunctionError", "I8", "I16", "I32", "I64", "I128", "Image", "ImageFormat", "Installation",
     "LaserScan", "Length", "Misconfigured", "Misuse", "Module", "Name", "NoConnection", "NotSent", "Odometry",
     "OutputLevel", "Pose", "Robot", "RohrpostError", "State", "Status", "TooManyCalls", "Twist", "U8", "U16", "U32",
-    "U64", "U128", "Variant", "command", "connect", "data", "data_out", "every", "inline", "is_available", "maybe", "on_data",
-    "on_record", "parameter", "run", "said", "stream", "wrapped",
+    "U64", "U128", "Variant", "command", "connect", "data", "data_out", "every", "inline", "is_available", "maybe",
+    "on_data", "on_record", "parameter", "run", "said", "stream", "wrapped",
 ]  # fmt: skip

@@ -297,8 +297,8 @@ def connect(
     Without ``server``: in what runs on this computer; if several do, in the ``installation`` of this name. ``node``:
     on which of its nodes here, if not the first.
 
-    With ``server`` (``HOST:PORT`` of the robot's TCP router): from anywhere, by :mod:`rohrpost.remote`. ``installation``
-    is then the file that ``rohrpost check FILE --json`` printed, or an :class:`rohrpost.Installation`. Raises
+    With ``server`` (``HOST:PORT`` of the robot's TCP router): from anywhere, by :mod:`rohrpost.remote`.
+    ``installation`` is then the file that ``rohrpost check FILE --json`` printed, or an :class:`rohrpost.Installation`. Raises
     :class:`rohrpost.NoConnection`.
     """
     if server is not None:
