@@ -1,6 +1,7 @@
 //! Teams of real processes: robots of systems of their own, each on a computer of its own.
 
 mod stranger;
+mod two_files;
 
 use crate::exact::replayed;
 use crate::harness::{Place, assert_has, head, lab, times, until};

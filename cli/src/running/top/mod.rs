@@ -16,7 +16,6 @@ mod draw;
 mod live;
 mod model;
 mod output;
-mod terminal;
 #[cfg(test)]
 mod tests;
 mod text;
