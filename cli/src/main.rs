@@ -30,7 +30,7 @@ mod terminal;
 use begin::{arena, check, demo, interface, new};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use computer::{clean, completions, doctor, man, run, version};
-use measure::{bw, delay, graph, hz, mailbox, ping, send, stream};
+use measure::{bw, data, delay, graph, hz, mailbox, ping, send, stream};
 use nodes::{bundle, keys, net, time};
 use running::{call, control, echo, halt, list, log, param, status, top};
 use std::process::ExitCode;
@@ -78,6 +78,8 @@ enum Command {
     Status(status::Arguments),
     /// Call a function of a module.
     Call(call::Arguments),
+    /// List all that modules publish: rates, sizes, subscribers.
+    Data(data::Arguments),
     /// Print the data that a module publishes.
     Echo(echo::Arguments),
     /// Print what modules say.
@@ -172,6 +174,7 @@ fn main() -> ExitCode {
         Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),
+        Command::Data(arguments) => data::run(&arguments),
         Command::Echo(arguments) => echo::run(&arguments),
         Command::Log(arguments) => log::run(&arguments),
         Command::Hz(arguments) => hz::run(&arguments),

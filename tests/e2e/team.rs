@@ -1,5 +1,6 @@
 //! Teams of real processes: robots of systems of their own, each on a computer of its own.
 
+mod intruders;
 mod stranger;
 mod two_files;
 
@@ -38,17 +39,22 @@ fn number(node: &str) -> u64 {
 impl Robots {
     /// None is launched yet. `way` makes the section by which a robot reaches the others.
     fn new(count: usize, way: impl Fn(&str) -> String) -> Option<Self> {
+        Self::of(count, "", |node| {
+            let id = number(node);
+            let settings = format!("start = {{ x-m = {id}.0, y-m = 0.0 }}, store = \"incarnation-{node}\"");
+            format!("{}{}", way(node), team_module(&settings))
+        })
+    }
+
+    /// Robots with further classes, each with these sections and modules.
+    fn of(count: usize, classes: &str, rest: impl Fn(&str) -> String) -> Option<Self> {
         let lab = lab(ROBOTS[..count].iter().copied(), "teams")?;
         let place = Place::new();
         for (node, _) in &ROBOTS[..count] {
             let id = number(node);
-            let head = head("team 120, team-router 100, tcp 64, output 32, logd 24, tool 16");
-            let text = format!(
-                "{}[nodes.{node}]\n{}[[module]]\nname = \"team.0\"\nbuiltin = \"team\"\nsettings = {{ start = {{ x-m = \
-                 {id}.0, y-m = 0.0 }}, store = \"incarnation-{node}\" }}\n",
-                head.replace("\"robot\"\nid = 1", &format!("\"{node}\"\nid = {id}")),
-                way(node)
-            );
+            let head = head(&format!("{classes}team 120, team-router 100, tcp 64, output 32, logd 24, tool 16"));
+            let head = head.replace("\"robot\"\nid = 1", &format!("\"{node}\"\nid = {id}"));
+            let text = format!("{head}[nodes.{node}]\n{}", rest(node));
             place.write(&format!("{node}.toml"), text);
         }
         let config = place.path("r1.toml");
@@ -91,6 +97,10 @@ impl Robots {
         });
         states
     }
+}
+
+fn team_module(settings: &str) -> String {
+    format!("[[module]]\nname = \"team.0\"\nbuiltin = \"team\"\nsettings = {{ {settings} }}\n")
 }
 
 /// Whether a robot says that it is in this group, and that all views in it are equal.

@@ -1,6 +1,6 @@
 //! `rohrpost team kill`, `stop` and `resume`: what a person does to robots that run on this computer.
 
-use crate::look::target::{Target, noted_config};
+use crate::look::target::Target;
 use crate::running::halt::halt_or_resume;
 use crate::terminal::{Failure, say};
 use rohrpost::interface::Interface;
@@ -8,6 +8,7 @@ use rohrpost::interfaces::SupervisorInterface;
 use rohrpost_config::Installation;
 use rohrpost_launch::launcher::launcher_of;
 use rohrpost_mailbox::Node;
+use rohrpost_modules::runtime::NotedNode;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -30,7 +31,7 @@ struct RunningNode {
 fn all_here() -> Result<Vec<RunningNode>, Failure> {
     let read = |path: PathBuf| {
         let memory = Node::open(&path)?;
-        let (config, name) = noted_config(&memory)?;
+        let NotedNode { config, node: name } = NotedNode::of(&memory)?;
         Ok(RunningNode { installation: Installation::load(&config)?, memory, config, name })
     };
     rohrpost::find_running().into_iter().map(read).collect()
@@ -67,7 +68,7 @@ pub(super) fn halt_all(is_halt: bool) -> Result<ExitCode, Failure> {
         return Err("no robot with a wormhole runs here; `rohrpost team launch FILE` launches some".into());
     }
     for robot in robots {
-        let asked = halt_or_resume(Target::new(Some(robot.config), Some(robot.name)), is_halt)?;
+        let asked = halt_or_resume(Target::new(Some(robot.config), None, Some(robot.name)), is_halt)?;
         if asked != ExitCode::SUCCESS {
             code = asked;
         }

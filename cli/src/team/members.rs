@@ -9,6 +9,7 @@ use crate::terminal::{Failure, say};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{TeamClock, TeamInterface, TeamMember, TeamNotice, TeamNoticeKind, TeamObject, TeamState};
 use rohrpost::types::Pose;
+use rohrpost_team::{RobotId, Suspicion};
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -104,7 +105,7 @@ pub(crate) fn tables(state: &TeamState) -> String {
     let heads = [">robot", "way", ">silent", "place", ">place's age", ">clock"];
     let mut text = table(heads, rows.into_iter().map(|(_, row)| row));
     text += &state.notices.iter().map(|notice| format!("\n{}", notice_text(*notice))).collect::<String>();
-    let objects: Vec<[String; 5]> = state.objects.iter().map(object_row).collect();
+    let objects: Vec<[String; 5]> = state.objects.iter().map(|object| object_row(object, state)).collect();
     if !objects.is_empty() {
         text += &format!("\n{}", table(["object", "place", "state", ">seen", "by"], objects));
     }
@@ -125,17 +126,24 @@ fn row(member: &TeamMember) -> [String; 6] {
     [member.robot.to_string(), way, ms(member.silent_ms), place(member.pose), pose_age, clock]
 }
 
-fn object_row(object: &TeamObject) -> [String; 5] {
+fn object_row(object: &TeamObject, of: &TeamState) -> [String; 5] {
     let id = &object.id;
     let state = match (object.fake, object.may_be, object.certain) {
         (true, ..) => "made up".into(),
-        (false, Some(robot), _) => format!("may be robot {robot}"),
+        (false, Some(robot), _) => suspicion_text(robot, of),
         (false, None, true) => "certain".into(),
         (false, None, false) => "uncertain".into(),
     };
     let by: Vec<String> = object.observers.iter().map(u8::to_string).collect();
     let place = format!("{:.2}, {:.2}", object.x_m, object.y_m);
     [format!("{}-{}.{}", id.observer, id.incarnation, id.number), place, state, ms(object.seen_ms), by.join(" ")]
+}
+
+/// The words of [`Suspicion`].
+fn suspicion_text(robot: u8, of: &TeamState) -> String {
+    let member = of.members.iter().find(|member| member.robot == robot);
+    let silent_ns = member.map(|member| member.silent_ms.saturating_mul(1_000_000));
+    RobotId::new(robot).map_or_else(|| "?".into(), |robot| Suspicion { robot, silent_ns }.to_string())
 }
 
 fn notice_text(TeamNotice { robot, kind }: TeamNotice) -> String {

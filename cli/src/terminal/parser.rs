@@ -8,7 +8,7 @@ use std::ffi::OsString;
 /// Headings and their subcommands, in the order in which a newcomer needs them.
 const GROUPS: [(&str, &[&str]); 9] = [
     ("To begin", &["demo", "new", "interface", "check", "launch"]),
-    ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status", "halt", "resume"]),
+    ("A robot that runs", &["list", "top", "log", "data", "echo", "call", "param", "status", "halt", "resume"]),
     ("One of its modules", &["restart", "stop", "start"]),
     ("To measure", &["hz", "bw", "delay", "mailbox", "stream", "graph", "ping", "send"]),
     ("Recordings", &["record", "replay"]),

@@ -28,7 +28,7 @@ struct Collector<'i> {
     notes: Vec<String>,
 }
 
-/// Collects the configuration, the parameters saved beside it, its programs, the files that its settings name, the
+/// Collects the configuration with what it includes, the parameters saved beside it, its programs, the files that its settings name, the
 /// hosts of its team, and `with`: files, and folders with all in them.
 ///
 /// # Errors
@@ -40,6 +40,7 @@ pub(super) fn collect(installation: &Installation, with: &[PathBuf]) -> Result<C
     let mut collector = Collector { installation, folder, files: BTreeSet::new(), notes: Vec::new() };
     let configuration = lexical(&std::path::absolute(&installation.path)?);
     collector.files.insert(configuration.clone());
+    installation.included().try_for_each(|file| collector.add(&file))?;
     let saved = installation.parameters.as_ref();
     let saved = saved.filter(|saved| saved.starts_with(&installation.folder) && saved.is_file());
     saved.into_iter().try_for_each(|saved| collector.add(saved))?;

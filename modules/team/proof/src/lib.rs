@@ -50,6 +50,11 @@ fn groups_keep_their_promises_after_two_faults() {
 }
 
 #[test]
+fn groups_keep_their_promises_after_a_death_and_a_loss() {
+    real::team_model::groups_hold_after_a_death_and_a_loss();
+}
+
+#[test]
 fn views_keep_their_promises() {
     real::team_model::views_hold();
 }
@@ -62,6 +67,11 @@ fn views_keep_their_promises_after_a_loss() {
 #[test]
 fn states_of_one_key_go_on_to_states_of_one_key() {
     real::team_model::walks();
+}
+
+#[test]
+fn robots_that_have_changed_places_go_on_as_the_others_do() {
+    real::team_model::walks_of_changed_places();
 }
 
 #[test]

@@ -14,6 +14,8 @@ const CIRCLE: &str = "no beat of robots that disagree ends as it began";
 impl Robot for Seed {
     type Message = Message;
     const ANSWERS: bool = true;
+    // The least id leads, and says so to the others.
+    const ARE_ALIKE: bool = false;
 
     fn restarted(&self, _: Store) -> Self {
         Self::new(self.id, self.id, self.id)
@@ -30,10 +32,6 @@ impl Robot for Seed {
 
     fn may_be_lost(_: &Message, loss: Loss) -> bool {
         loss == Loss::Anything
-    }
-
-    fn pair(&self, _: u64) -> (u8, u8) {
-        Self::pair(self)
     }
 
     fn incarnation(&self) -> u32 {

@@ -1,17 +1,19 @@
 //! What the future of a group depends on. A private part of the core's `group`.
 
 use super::super::team_model::key::Key;
-use super::{Direct, Group, Hello, Member};
+use super::{Direct, Group, Hello, Member, Notice};
 use super::super::RobotId;
 
 impl Group {
     pub(crate) fn key(&self, now_ns: u64, key: &mut Key) {
         key.version(self.me, self.version);
         key.plain(self.has_raised);
-        key.hash(&self.notices);
-        for (robot, member) in &self.members {
-            key.plain(robot.get());
-            member.key(*robot, now_ns, self.settings, key);
+        let kinds = [Notice::Duplicate, Notice::OtherMap, Notice::OtherTree, Notice::ClockOff];
+        for robot in key.robots() {
+            key.hash(&kinds.map(|kind| self.notices.contains(&kind(robot))));
+            let Some(member) = self.members.get(&robot) else { continue };
+            key.hash(&key.name(robot));
+            member.key(robot, now_ns, self.settings, key);
         }
     }
 
@@ -37,7 +39,7 @@ impl Member {
             key.version(robot, *version);
             let age_ns = (now_ns - heard_ns).min(max_age_ns + 1);
             key.plain(age_ns);
-            key.hash(hears);
+            key.hash(&key.robots().map(|robot| hears.contains(&robot)).collect::<Vec<_>>());
             // Of a robot that is not heard nobody asks for these.
             key.hash(&(age_ns <= max_age_ns).then_some((map, digests)));
         }
@@ -49,8 +51,8 @@ impl Hello {
         key.version(self.from, self.version);
         key.plain(self.agrees);
         key.hash(&self.digests);
-        for entry in &self.entries {
-            key.plain(entry.robot.get());
+        for robot in key.robots() {
+            let Some(entry) = self.entries.iter().find(|entry| entry.robot == robot) else { continue };
             key.version(entry.robot, entry.version);
             key.plain(entry.hops);
             key.plain(entry.age_ns);

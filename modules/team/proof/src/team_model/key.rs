@@ -13,9 +13,15 @@
 //! - *The observer with which the last synchro ended*: the next one begins behind it, which counts only where a synchro
 //!   is cut; the model's have room for all.
 //!
-//! `walk.rs` tests that states of one key go on to states of one key.
+//! *Names.* Robots without records do the same whatever their ids are: nothing that one sends or decides follows from an
+//! order of ids, and the promises about them name no id. They begin alike. So states are alike in which robots have only
+//! changed places, and their key is the least of those of all [`NAMINGS`].
+//!
+//! `walk.rs` tests that states of one key go on to states of one key, and that robots that have changed places go on as
+//! the others do.
 
 use super::super::{RobotId, Version};
+use super::world::ROBOTS;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Gaps between counters of one run that are told apart.
@@ -27,13 +33,36 @@ enum Item {
     Version(RobotId, Version),
 }
 
+/// For each place the one of which its robot has the name.
+pub(crate) type Naming = [usize; ROBOTS];
+
+/// All ways to name robots; in the first one each has its own name.
+pub(crate) const NAMINGS: [Naming; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+
 /// Collects what counts.
-#[derive(Default)]
 pub(crate) struct Key {
     items: Vec<Item>,
+    naming: Naming,
 }
 
 impl Key {
+    pub(crate) fn of(naming: Naming) -> Self {
+        Self { items: Vec::new(), naming }
+    }
+
+    /// All robots, in the order of their names.
+    pub(crate) fn robots(&self) -> impl Iterator<Item = RobotId> + use<> {
+        let naming = self.naming;
+        let mut places: [usize; ROBOTS] = std::array::from_fn(|place| place);
+        places.sort_unstable_by_key(|place| naming[*place]);
+        places.into_iter().map(id)
+    }
+
+    /// The name of a robot.
+    pub(crate) fn name(&self, robot: RobotId) -> RobotId {
+        id(self.naming[usize::from(robot.get()) - 1])
+    }
+
     pub(crate) fn plain(&mut self, value: impl Into<u64>) {
         self.items.push(Item::Plain(value.into()));
     }
@@ -45,7 +74,7 @@ impl Key {
 
     /// Incarnation and counter of a hello of this robot.
     pub(crate) fn version(&mut self, of: RobotId, version: Version) {
-        self.items.push(Item::Version(of, version));
+        self.items.push(Item::Version(self.name(of), version));
     }
 
     /// Of states with one past: their counters are of one count.
@@ -87,6 +116,11 @@ impl Key {
         }
         numbers
     }
+}
+
+/// The robot at a place.
+pub(crate) fn id(place: usize) -> RobotId {
+    RobotId::new(place as u8 + 1).expect("robots 1 to 3")
 }
 
 pub(crate) fn hash_of(value: &(impl Hash + ?Sized)) -> u64 {

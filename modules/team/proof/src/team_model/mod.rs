@@ -31,7 +31,7 @@ pub(crate) mod world;
 
 use crate::check;
 use bounds::{Bounds, Loss, STORIES, Story};
-pub(crate) use walk::walks;
+pub(crate) use walk::{walks, walks_of_changed_places};
 pub(crate) use world::Teams;
 
 /// No fault.
@@ -52,6 +52,12 @@ pub(crate) fn groups_hold() {
 /// One message is lost, and others come a round later.
 pub(crate) fn groups_hold_after_two_faults() {
     holds("groups of three, one loss, one delay", Bounds { may_lose: Loss::Anything, may_delay: true, ..CALM });
+}
+
+/// One robot dies and comes back, and one message is lost, in either order.
+pub(crate) fn groups_hold_after_a_death_and_a_loss() {
+    let left = Bounds { may_die: true, may_lose: Loss::Anything, ..CALM };
+    holds("groups of three, one death and restart, one loss", left);
 }
 
 /// Robots with records.

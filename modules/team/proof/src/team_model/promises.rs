@@ -5,7 +5,8 @@ use super::super::group::Notice;
 use super::super::view::Record;
 use super::super::{RobotId, Team, Version};
 use super::bounds::{Bounds, Loss, Story};
-use super::team::{MAX_AGE_BEATS, Message, id, is_certain, knows_its_end};
+use super::key::id;
+use super::team::{MAX_AGE_BEATS, Message, is_certain, knows_its_end};
 use super::world::{Action, ROBOTS, Robot, State, Step, Teams};
 use stateright::Property;
 use std::sync::Arc;
@@ -148,13 +149,13 @@ pub(super) fn properties(bounds: Bounds) -> Vec<Property<Teams<Team>>> {
     always().into_iter().chain(sometimes).collect()
 }
 
-/// Whether leader and group of a robot are the least and the greatest that live; a ghost may be one as long as it may
-/// be one.
+/// Whether those that a robot takes for fresh are all that live, itself among them, and so its leader and group are the
+/// least and the greatest of these; a ghost may be one as long as it may be one.
 fn is_right(state: &State<Team>, place: usize) -> bool {
-    let pair = state.robots[place].pair(state.now_ns(place));
-    let of =
-        |robots: Vec<usize>| robots.first().zip(robots.last()).map(|(least, most)| (*least as u8 + 1, *most as u8 + 1));
-    Some(pair) == of(state.alive().collect()) || state.dead_for < GHOST && Some(pair) == of((0..ROBOTS).collect())
+    let fresh = state.robots[place].group().fresh(state.now_ns(place)).map(|(robot, _)| robot);
+    let fresh: Vec<RobotId> = fresh.collect();
+    let is_it = |all: Vec<usize>| all.into_iter().filter(|it| *it != place).map(id).eq(fresh.iter().copied());
+    is_it(state.alive().collect()) || state.dead_for < GHOST && is_it((0..ROBOTS).collect())
 }
 
 /// Whether a robot takes a dead one for fresh.

@@ -11,6 +11,7 @@ use stateright::Property;
 impl Robot for Team {
     type Message = Message;
     const ANSWERS: bool = false;
+    const ARE_ALIKE: bool = true;
 
     fn restarted(&self, store: Store) -> Self {
         let incarnation = match store {
@@ -41,10 +42,6 @@ impl Robot for Team {
             Loss::Records => matches!(message, Message::Records(_)),
             Loss::Anything => true,
         }
-    }
-
-    fn pair(&self, now_ns: u64) -> (u8, u8) {
-        (self.group().leader(now_ns).get(), self.group().group(now_ns).get())
     }
 
     fn incarnation(&self) -> u32 {

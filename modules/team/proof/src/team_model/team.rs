@@ -2,8 +2,9 @@
 
 use super::super::group::{GroupSettings, Hello};
 use super::super::view::{Records, ViewSettings};
-use super::super::{Position, RobotId, Team, TeamSettings};
+use super::super::{Position, Team, TeamSettings};
 use super::bounds::{Bounds, Story};
+use super::key::id;
 use super::world::{BEAT_NS, ROBOTS, State};
 
 /// ROBOT_MAX_AGE: a single lost hello is enough to be taken for dead.
@@ -30,10 +31,6 @@ pub(super) fn settings() -> TeamSettings {
     };
     let group = GroupSettings { beat_ns: BEAT_NS, max_age_ns: MAX_AGE_BEATS * BEAT_NS };
     TeamSettings { group, view, drift_ppb: 0, clock_off_ns: never_ns }
-}
-
-pub(crate) fn id(place: usize) -> RobotId {
-    RobotId::new(place as u8 + 1).expect("robots 1 to 3")
 }
 
 /// What a robot sends.

@@ -7,7 +7,7 @@ impl Team {
     pub(crate) fn key(&self, now_ns: u64, key: &mut Key) {
         self.group.key(now_ns, key);
         self.view.key(key);
-        key.hash(&self.missing);
+        key.hash(&key.robots().map(|robot| self.missing.get(&robot)).collect::<Vec<_>>());
         key.version(self.group.me(), self.last_synchro);
     }
 }

@@ -1,7 +1,7 @@
 //! Robots, what is on its way between them, and the steps of both.
 
-use super::bounds::{Bounds, Loss, Store};
-use super::key::Key;
+use super::bounds::{Bounds, Loss, Store, Story};
+use super::key::{Key, NAMINGS, Naming};
 use stateright::{Model, Property};
 use std::collections::HashSet;
 use std::fmt::Debug;
@@ -22,6 +22,8 @@ pub(crate) trait Robot: Clone + Debug + Send + Sync + Sized + 'static {
     /// Whether it answers what it hears at once. Then the order of what happens at different robots counts, and each
     /// turn is one action.
     const ANSWERS: bool;
+    /// Whether those without records do the same but for their names, if they change places.
+    const ARE_ALIKE: bool;
     /// A dead robot starts again; times are ns of its own clock.
     fn restarted(&self, store: Store) -> Self;
     /// What it sends in its beat.
@@ -30,8 +32,6 @@ pub(crate) trait Robot: Clone + Debug + Send + Sync + Sized + 'static {
     fn hear(&mut self, now_ns: u64, message: &Self::Message) -> Option<Self::Message>;
     /// Whether it is a message of those of which one is lost.
     fn may_be_lost(message: &Self::Message, loss: Loss) -> bool;
-    /// Leader and group.
-    fn pair(&self, now_ns: u64) -> (u8, u8);
     /// What is stored, and outlives it.
     fn incarnation(&self) -> u32;
     /// What its future depends on.
@@ -175,7 +175,11 @@ impl<R: Robot> State<R> {
         let is_over = self.is_round_over();
         for place in self.alive().filter(|place| !self.has_beaten[*place]) {
             let heard = if R::ANSWERS { vec![Hearing::default()] } else { self.hearings(place) };
-            turns.extend(heard.into_iter().map(|heard| heard.then(Action::Beat(place))));
+            let beats: Vec<Turn> = heard.into_iter().map(|heard| heard.then(Action::Beat(place))).collect();
+            if self.left.may_lose != Loss::Nothing {
+                beats.iter().for_each(|beat| self.add_losses(beat, place, &mut turns));
+            }
+            turns.extend(beats);
             turns.extend(self.left.may_die.then(|| vec![Action::Die(place)]));
         }
         let awake = self.alive().find(|place| !self.rests[*place]);
@@ -194,15 +198,19 @@ impl<R: Robot> State<R> {
             let stores = [Store::Kept, Store::Lost, Store::Old];
             turns.extend(dead.flat_map(|place| stores.map(|store| vec![Action::Restart(place, store)])));
         }
-        // To the robots a message that is lost later on is the same.
-        if self.left.may_lose != Loss::Nothing && self.rests == [false; ROBOTS] {
-            for (to, from) in self.senders() {
-                let sent = self.channels[to][from].iter().enumerate();
-                let lost = sent.filter(|(_, message)| R::may_be_lost(message, self.left.may_lose));
-                turns.extend(lost.map(|(at, _)| vec![Action::Lose { from, to, at }]));
-            }
-        }
         turns
+    }
+
+    /// The turns that go on with the loss of something that their beat has sent. To the robots a message that is lost
+    /// later is the same, and promises are counted from the loss on.
+    fn add_losses(&self, beat: &Turn, from: usize, turns: &mut Vec<Turn>) {
+        let sent = self.after(beat);
+        for to in 0..ROBOTS {
+            let before = self.channels[to][from].len();
+            let new = sent.channels[to][from].iter().enumerate().skip(before);
+            let lost = new.filter(|(_, message)| R::may_be_lost(message, self.left.may_lose));
+            turns.extend(lost.map(|(at, _)| [&beat[..], &[Action::Lose { from, to, at }]].concat()));
+        }
     }
 
     /// What a robot may take now: each order that makes a difference to it, and each that breaks a promise.
@@ -210,7 +218,7 @@ impl<R: Robot> State<R> {
         let (mut found, mut known) = (Vec::new(), HashSet::new());
         let mut open = vec![(Turn::new(), self.clone())];
         while let Some((taken, state)) = open.pop() {
-            let mut key = Key::default();
+            let mut key = Key::of(NAMINGS[0]);
             state.robots[to].key(state.now_ns(to), &mut key);
             let left = state.channels[to].each_ref().map(Vec::len);
             if state.broken.is_empty() && !known.insert((left, key.exact())) {
@@ -305,12 +313,24 @@ impl<R: Robot> State<R> {
 
     /// What the future depends on, with this count of calm rounds.
     pub(crate) fn computed_key(&self, calm: u8) -> u64 {
-        let mut key = Key::default();
-        key.hash(&(self.has_beaten, self.rests, self.left, self.dead_for, calm, &self.broken));
-        key.hash(&std::array::from_fn::<_, ROBOTS, _>(|it| self.is_dead[it].then(|| self.robots[it].incarnation())));
-        for place in self.alive() {
+        let is_any_name = R::ARE_ALIKE && self.left.story == Story::Nothing;
+        let namings = if is_any_name { &NAMINGS[..] } else { &NAMINGS[..1] };
+        namings.iter().map(|naming| self.named_key(calm, *naming)).min().unwrap_or_default()
+    }
+
+    /// The key of this state, if its robots had these names.
+    pub(crate) fn named_key(&self, calm: u8, naming: Naming) -> u64 {
+        let mut key = Key::of(naming);
+        let places = || Key::of(naming).robots().map(|robot| usize::from(robot.get()) - 1);
+        key.hash(&(self.left, self.dead_for, calm, &self.broken));
+        for place in places() {
+            key.hash(&(self.has_beaten[place], self.rests[place], self.is_dead[place]));
+            if self.is_dead[place] {
+                key.plain(self.robots[place].incarnation());
+                continue;
+            }
             self.robots[place].key(self.now_ns(place), &mut key);
-            for from in &self.channels[place] {
+            for from in places().map(|from| &self.channels[place][from]) {
                 key.plain(from.len() as u64);
                 from.iter().for_each(|message| R::message_key(message, &mut key));
             }
