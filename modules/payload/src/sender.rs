@@ -1,4 +1,4 @@
-//! The robot in whose name a message is.
+//! The robot that a message names as its sender.
 
 use rohrpost_team::RobotId;
 

@@ -160,7 +160,10 @@ fn robots_and_a_station_work_from_two_files_and_strangers_take_no_part() {
     // A robot has something to say.
     computers.says(3, &["call", "payload.0", "say", "the door is closed"]).ok();
     until("the station has heard it", || {
-        computers.says(STATION, &["echo", "station.0", "state", "--json", "--count", "1"]).out.contains("the door is closed")
+        computers
+            .says(STATION, &["echo", "station.0", "state", "--json", "--count", "1"])
+            .out
+            .contains("the door is closed")
     });
     // All robots stand until they are let go.
     let halted = computers.says(STATION, &["halt", "--all"]).ok();

@@ -286,7 +286,7 @@ fn requests_are_repeated_until_each_robot_has_answered_by_name_or_is_given_up() 
     scene.run_s(12);
     assert_eq!(scene.states()[2], (3, Asking::GivenUp));
     let runs: Vec<u8> = scene.ends.iter().filter(|end| end.kernel.is_some()).map(|end| end.id.get()).collect();
-    assert_eq!(runs, [2, STATION], "who obeys has ended");
+    assert_eq!(runs, [2, STATION], "robots that obey have ended");
 }
 
 #[test]

@@ -38,7 +38,7 @@ enum Command {
     /// Move one.
     #[command(after_help = "Example: rohrpost station fake move 6-1.1 7.5 1.5")]
     Move {
-        /// Its name, as `rohrpost team` shows it.
+        /// Name of the intruder, as `rohrpost team` shows it.
         name: FakeName,
         #[command(flatten)]
         place: Place,
@@ -48,7 +48,7 @@ enum Command {
     /// Remove one.
     #[command(after_help = "Example: rohrpost station fake remove 6-1.1")]
     Remove {
-        /// Its name, as `rohrpost team` shows it.
+        /// Name of the intruder, as `rohrpost team` shows it.
         name: FakeName,
         #[command(flatten)]
         inquiry: Inquiry,

@@ -9,7 +9,7 @@ use std::path::Path;
 
 const MILLISECOND_NS: u64 = 1_000_000;
 
-/// The same as those of its team's payloads.
+/// As of the payloads of its team.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub(crate) struct Settings {

@@ -1,4 +1,4 @@
-//! Messages between this module and its teammates: which data number each kind has, and whose name they are in.
+//! Messages between this module and its teammates: which data number each kind has, and the robot that each names.
 
 use super::{HELLO, MESSAGES, RECORDS, SLOTS};
 use rohrpost_mailbox::{ALL_SYSTEMS, Name, Shape};
