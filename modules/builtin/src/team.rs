@@ -14,6 +14,7 @@ mod surroundings;
 
 use super::settings::Settings as _;
 pub(crate) use air::Air;
+use air::{HELLO, MESSAGES, RECORDS, SLOTS};
 pub(super) use check::problems;
 pub(crate) use clock::OwnClock;
 use rohrpost_mailbox::{ALL_SYSTEMS, Name, Shape};
@@ -28,14 +29,6 @@ use state::TeamTold;
 use std::time::Duration;
 use store::Store;
 use surroundings::Surroundings;
-
-/// Mailbox for messages of teammates: local id 3.
-const MESSAGES: u8 = 3;
-/// Data numbers of the messages; 1 is the state.
-const HELLO: u16 = 2;
-const RECORDS: u16 = 3;
-/// Messages that may wait: several beats of a large team.
-const SLOTS: u16 = 256;
 
 pub(super) struct TeamModule {
     team: TeamCore,

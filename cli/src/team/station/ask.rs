@@ -1,6 +1,6 @@
 //! `rohrpost station info` and `quit`: each robot is asked until it answers, and told by name.
 
-use super::StationLink;
+use super::link::StationLink;
 use crate::look::target::Inquiry;
 use crate::terminal::{Failure, complain, say};
 use rohrpost::interfaces::{StationAnswer, StationRequest, StationRequestKind, StationState};

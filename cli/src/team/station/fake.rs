@@ -1,6 +1,6 @@
 //! `rohrpost station fake`: intruders that a person makes up.
 
-use super::StationLink;
+use super::link::StationLink;
 use crate::look::target::Inquiry;
 use crate::terminal::{Failure, say};
 use clap::Subcommand;

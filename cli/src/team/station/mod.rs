@@ -2,20 +2,12 @@
 
 mod ask;
 mod fake;
+mod link;
 mod watch;
 
 use super::two_files;
-use crate::look::newest;
-use crate::look::observer::Tool;
-use crate::look::target::{Inquiry, Running};
 use crate::terminal::Failure;
 use clap::Subcommand;
-use rohrpost::interface::Interface;
-use rohrpost::interfaces::{StationInterface, StationState, TeamRefusal};
-use rohrpost::wire::{append, from_bytes};
-use rohrpost_mailbox::Name;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -47,34 +39,5 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Command::Info(arguments) => ask::info(arguments),
         Command::Quit(arguments) => ask::quit(arguments),
         Command::Fake(arguments) => fake::run(arguments),
-    }
-}
-
-/// The station that runs here.
-struct StationLink {
-    running: Running,
-    tool: Tool,
-    module: Name,
-}
-
-impl StationLink {
-    fn find(inquiry: &Inquiry) -> Result<Self, Failure> {
-        let running = inquiry.target.find()?;
-        let module = running.module(StationInterface::CLASS)?;
-        let tool = running.join(inquiry.timeout()?)?;
-        Ok(Self { running, tool, module })
-    }
-
-    /// Calls a function that may refuse.
-    fn call<T: DeserializeOwned>(&mut self, function: u16, arguments: &impl Serialize) -> Result<T, Failure> {
-        let write = |body: &mut Vec<u8>| append(body, arguments);
-        let read = |bytes: &[u8]| from_bytes::<Result<T, TeamRefusal>>(bytes);
-        let answer = self.tool.call(self.module, function, StationInterface::hash(), write, read);
-        Ok(answer.map_err(|error| self.running.told(self.module, &error))??)
-    }
-
-    fn state(&mut self) -> Result<StationState, Failure> {
-        let newest = newest(&mut self.tool, self.module, StationInterface::STATE);
-        newest.map(|(_, state)| state).map_err(|error| self.running.told(self.module, &error))
     }
 }

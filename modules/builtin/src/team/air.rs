@@ -1,6 +1,5 @@
 //! Messages between this module and its teammates: which data number each kind has, and the robot that each names.
 
-use super::{HELLO, MESSAGES, RECORDS, SLOTS};
 use rohrpost_mailbox::{ALL_SYSTEMS, Name, Shape};
 use rohrpost_modules::ModuleError;
 use rohrpost_modules::common::DataHead;
@@ -10,6 +9,13 @@ use rohrpost_payload::sender;
 use rohrpost_team::RobotId;
 use rohrpost_team::view::RECORDS_BYTES_MAX;
 
+/// Mailbox for messages of teammates: local id 3.
+pub(super) const MESSAGES: u8 = 3;
+/// Data numbers of the messages; 1 is the state.
+pub(super) const HELLO: u16 = 2;
+pub(super) const RECORDS: u16 = 3;
+/// Messages that may wait: several beats of a large team.
+pub(super) const SLOTS: u16 = 256;
 /// Data numbers of messages that a module `team` does not send.
 const TRAFFIC: u16 = 4;
 const EVENT: u16 = 5;

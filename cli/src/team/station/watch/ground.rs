@@ -1,6 +1,6 @@
 //! The map of a station, as its settings name it.
 
-use super::StationLink;
+use crate::team::station::link::StationLink;
 use crate::terminal::Failure;
 use rohrpost_team::grid::{Cell, Direction, Grid, Map, Placement, Square};
 use serde::Deserialize;

@@ -8,7 +8,8 @@
 mod draw;
 mod ground;
 
-use super::{StationLink, ask, fake};
+use super::link::StationLink;
+use super::{ask, fake};
 use crate::look::newest;
 use crate::look::target::Inquiry;
 use crate::terminal::Failure;
