@@ -117,7 +117,7 @@ pub use sources::resolved_text;
 pub use standby::{HOLDERS_FILE, LeaseTimes, MOVING_MODULES_MAX, holder_line, holders};
 pub use stream::{RECORD_BYTES_MAX, StreamSpec};
 pub use tcp::{TCP_SERVER, Tcp};
-pub use team::{TEAM_PEERS_MAX, Team, TeamPeer, TeamReach, hosts};
+pub use team::{RosterMistake, TEAM_PEERS_MAX, Team, TeamHost, TeamPeer, TeamReach, hosts, roster};
 pub use time::{ClockSetPolicy, TimeSource};
 pub use units::{
     UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,

@@ -25,9 +25,9 @@ pub const RECORDER: &str = "logd";
 /// The built-in module that plays recordings.
 pub const REPLAY: &str = "replay";
 /// The modules that the `rohrpost` program itself contains.
-pub const BUILTINS: [&str; 13] = [
-    "sim", "carmen", "mapper", "pilot", "mischief", "wormhole", "team", "payload", "arena", "body", "output", RECORDER,
-    REPLAY,
+pub const BUILTINS: [&str; 14] = [
+    "sim", "carmen", "mapper", "pilot", "mischief", "wormhole", "team", "payload", "station", "arena", "body",
+    "output", RECORDER, REPLAY,
 ];
 
 /// What runs as a module.

@@ -4,8 +4,10 @@
 //! `team-router.0` on the first node of the file, `team-router.1` on the second, and so on.
 
 mod hosts;
+mod roster;
 
 pub use hosts::{TEAM_PEERS_MAX, TeamPeer, hosts};
+pub use roster::{RosterMistake, TeamHost, roster};
 
 use crate::classes::{ClassTable, TEAM_ROUTER};
 use crate::errors::Errors;

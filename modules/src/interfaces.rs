@@ -7,6 +7,7 @@ mod recorder;
 mod replay;
 mod router;
 mod slots;
+mod station;
 mod tcp;
 mod team;
 mod team_router;
@@ -28,6 +29,10 @@ pub use router::{
     RouterInterface, RouterProxy, SocketFailure,
 };
 pub use slots::{SlotState, SlotUse, TunnelState};
+pub use station::{
+    Station, StationAnswer, StationInterface, StationMessage, StationProxy, StationRequest, StationRequestKind,
+    StationRobot, StationState,
+};
 
 pub use tcp::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondLink, BeyondNode, BeyondOutage,

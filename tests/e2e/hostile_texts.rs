@@ -151,7 +151,7 @@ pub(crate) fn assert_plain(what: &[&str], text: &str) {
 }
 
 /// Subcommands that print nothing that a module, a node or an outside program wrote.
-const OWN_WORDS: [&str; 25] = [
+const OWN_WORDS: [&str; 27] = [
     "check",
     "launch",
     "demo",
@@ -175,7 +175,9 @@ const OWN_WORDS: [&str; 25] = [
     // Of supervisors, with words as plain lines; of files.
     "halt",
     "resume",
+    "station",
     "arena",
+    "wormhole",
     "bundle",
     "path",
     "entrances",

@@ -106,6 +106,7 @@ mod small_memory;
 mod squad;
 mod standby;
 mod start;
+mod station;
 mod strangers;
 mod streams;
 mod streams_described;

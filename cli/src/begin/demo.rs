@@ -6,7 +6,7 @@ mod asked;
 mod beyond;
 mod chaos;
 mod copy;
-mod folder;
+pub(crate) mod folder;
 mod gui;
 mod incarnations;
 mod losses;

@@ -83,23 +83,27 @@ fn view_digest(state: &TeamState) -> String {
 
 /// The verdict, then a row for each robot, then what there is beside it.
 fn text(state: &TeamState) -> String {
+    format!("{}\n\n{}", verdict(state), tables(state))
+}
+
+/// Which group it is, and whether its robots agree.
+pub(crate) fn verdict(state: &TeamState) -> String {
     let fresh = state.members.iter().filter(|member| member.fresh).count() + 1;
     let views = match state.differs_ms {
         None => "views are equal".to_owned(),
         Some(since_ms) => format!("views differ since {}", ms(since_ms)),
     };
-    let mut text = format!(
-        "group {} of {}, led by robot {}; {views}\n\n",
-        state.group,
-        counted(fresh as u64, "robot"),
-        state.leader
-    );
+    format!("group {} of {}, led by robot {}; {views}", state.group, counted(fresh as u64, "robot"), state.leader)
+}
+
+/// A row for each robot, then what there is beside it.
+pub(crate) fn tables(state: &TeamState) -> String {
     let own = [state.robot.to_string(), "here".into(), String::new(), place(state.pose), String::new(), String::new()];
     let mut rows: Vec<(u8, [String; 6])> = state.members.iter().map(|member| (member.robot, row(member))).collect();
     rows.push((state.robot, own));
     rows.sort_unstable();
     let heads = [">robot", "way", ">silent", "place", ">place's age", ">clock"];
-    text += &table(heads, rows.into_iter().map(|(_, row)| row));
+    let mut text = table(heads, rows.into_iter().map(|(_, row)| row));
     text += &state.notices.iter().map(|notice| format!("\n{}", notice_text(*notice))).collect::<String>();
     let objects: Vec<[String; 5]> = state.objects.iter().map(|object| object_row(object, state)).collect();
     if !objects.is_empty() {

@@ -9,3 +9,5 @@ pub(crate) mod members;
 pub(crate) mod path;
 pub(crate) mod referee;
 pub(crate) mod squad;
+pub(crate) mod station;
+pub(crate) mod two_files;

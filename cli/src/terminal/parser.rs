@@ -13,7 +13,7 @@ const GROUPS: [(&str, &[&str]); 9] = [
     ("To measure", &["hz", "bw", "delay", "mailbox", "stream", "graph", "ping", "send"]),
     ("Recordings", &["record", "replay"]),
     ("Several nodes", &["net", "time", "keys", "bundle"]),
-    ("Teams of robots", &["team", "path", "entrances"]),
+    ("Teams of robots", &["team", "wormhole", "station", "path", "entrances"]),
     ("This computer", &["doctor", "bench", "clean", "completions", "man", "version"]),
     ("Else", &["run", "arena", "router", "tcp-router", "tcp-client", "team-router", "help"]),
 ];

@@ -19,6 +19,7 @@ mod payload;
 mod pilot;
 mod settings;
 mod sim;
+mod station;
 mod team;
 mod world;
 mod wormhole;
@@ -66,6 +67,7 @@ impl Builtin {
             "mischief" => Self::of::<mischief::MischiefModule>(),
             payload::NAME => Self::of::<payload::PayloadModule>(),
             "pilot" => Self::of::<pilot::PilotModule>(),
+            station::NAME => Self::of::<station::StationModule>(),
             "team" => Self::of::<team::TeamModule>(),
             "wormhole" => Self::of::<wormhole::WormholeModule>(),
             "output" => Self::of::<output::OutputModule>(),
@@ -93,6 +95,7 @@ pub fn of_class(class: &str) -> Option<&'static str> {
         "mischief",
         "team",
         payload::NAME,
+        station::NAME,
         "wormhole",
         "output",
         RECORDER,

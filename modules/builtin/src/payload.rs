@@ -15,47 +15,45 @@ mod state;
 
 use super::settings::Settings as _;
 use super::team::store::Store;
-use super::team::{HELLO, MESSAGES, OwnClock, RECORDS, SLOTS, state as team_state};
+use super::team::{Air, OwnClock, state as team_state};
+use super::wormhole::program::launch_of;
 pub(super) use check::{NAME, problems};
-use rohrpost_mailbox::{ALL_SYSTEMS, Name, Shape};
-use rohrpost_modules::common::DataHead;
+use rohrpost_launch::launcher::LauncherProxy;
 use rohrpost_modules::interfaces::{
-    Destination, LaserInterface, Payload as PayloadServer, PayloadInterface, SupervisorProxy, Team, TeamCounts,
-    TeamInterface, TeamObjectId, TeamRefusal, WheelsInterface,
+    Destination, LaserInterface, Payload as PayloadServer, PayloadInterface, SupervisorProxy, Team, TeamInterface,
+    TeamObjectId, TeamRefusal, WheelsInterface,
 };
 use rohrpost_modules::runtime::{Context, Received, Stream, StreamSubscription};
 use rohrpost_modules::types::{LaserScan, Odometry};
 use rohrpost_modules::{Module, ModuleError};
-use rohrpost_payload::{News, Payload, Sensed, sender};
-use rohrpost_team::RobotId;
-use rohrpost_team::view::RECORDS_BYTES_MAX;
+use rohrpost_payload::{News, Payload, Report, Sensed};
 use settings::Settings;
 use state::Beats;
 pub(super) use state::cell;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Data numbers of messages that a module `team` does not send.
-const TRAFFIC: u16 = 4;
-const EVENT: u16 = 5;
-
 /// Beats at the start in which a robot that is lost is no news.
 const FIRST_BEATS: u64 = 4;
+/// The halt of a robot that has ended: its own first one.
+const QUIT_HALT: u32 = 1;
 /// Poses further from a scan are not of its moment.
 const POSE_GAP: Duration = Duration::from_millis(500);
 
 pub(super) struct PayloadModule {
     payload: Payload,
-    me: RobotId,
+    air: Air,
     clock: OwnClock,
     scans: StreamSubscription<LaserScan>,
     poses: Stream<Odometry>,
     wormhole: SupervisorProxy,
     store: Store,
-    to: Name,
+    /// Ends this module for good, under its name here.
+    launch: Option<LauncherProxy>,
+    name: String,
+    has_quit: bool,
     beat_ms: u32,
     promise_ms: u32,
-    counts: TeamCounts,
     told: team_state::TeamTold,
     beats: Beats,
     /// Where its way ended when the wormhole was told last.
@@ -70,10 +68,10 @@ impl Module for PayloadModule {
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         settings.check()?;
-        let name = context.me();
-        let me = RobotId::new(name.system()).ok_or_else(|| ModuleError::configuration("its system has no number"))?;
-        let body_bytes_max = (DataHead::BYTES + RECORDS_BYTES_MAX) as u16;
-        context.open_mailbox_to_all(MESSAGES, Shape { slots: SLOTS, body_bytes_max, ..Shape::default() })?;
+        let air = Air::open(context)?;
+        let installation = context.installation();
+        let (own, name) = (installation.module(context.me()), installation.classes.format(context.me()));
+        let launch = own.and_then(|own| launch_of(&own.node, installation, context));
         let ground = settings.ground(&context.path(&settings.map))?;
         let scans = context.subscribe_stream(LaserInterface::SCAN, &settings.laser)?;
         let poses = context.stream(WheelsInterface::ODOMETRY, &settings.odometry)?.with_gap(POSE_GAP);
@@ -86,20 +84,28 @@ impl Module for PayloadModule {
         context.set_period(Duration::from_millis(settings.beat_ms.into()));
         let clock = OwnClock::begin(context);
         let team = settings.team(&core);
-        let payload =
-            Payload::new(clock.now_ns(), me, incarnation, Arc::new(ground), core, team, settings.seed(name.system()))?;
+        let payload = Payload::new(
+            clock.now_ns(),
+            air.me(),
+            incarnation,
+            Arc::new(ground),
+            core,
+            team,
+            settings.seed(air.me().get()),
+        )?;
         Ok(Self {
             payload,
-            me,
+            air,
             clock,
             scans,
             poses,
             wormhole,
             store,
-            to: Name::new(ALL_SYSTEMS, name.class().0, name.instance(), MESSAGES),
+            launch,
+            name,
+            has_quit: false,
             beat_ms: settings.beat_ms,
             promise_ms,
-            counts: TeamCounts::default(),
             told: team_state::TeamTold::default(),
             beats: Beats::new(settings.beat_ms),
             destination_m: None,
@@ -115,9 +121,9 @@ impl Module for PayloadModule {
     }
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        let is_theirs = data.from.class() == self.to.class() && data.mailbox == MESSAGES;
-        if is_theirs {
-            self.hear(data);
+        if self.air.is_message(data) {
+            let (payload, now_ns) = (&mut self.payload, self.clock.now_ns());
+            self.air.hear(data, |message| payload.hear(now_ns, message).is_ok());
         } else if let Ok(Some(scan)) = data.read(&self.scans) {
             let located = self.poses.at(data.moment()).ok().and_then(Result::ok);
             let speed_m_s = located.map_or(0.0, |located| located.twist.speed_m_s);
@@ -141,7 +147,7 @@ impl Module for PayloadModule {
         let state = state::of(&self.payload, self.beats.told());
         context.publish_now(PayloadInterface::STATE, &state)?;
         let (team, pose) = (self.payload.team(), state.pose.and_then(state::told));
-        let state = team_state::of(team, now_ns, pose, self.beat_ms, self.counts, &mut self.told);
+        let state = team_state::of(team, now_ns, pose, self.beat_ms, self.air.counts, &mut self.told);
         context.publish_now(TeamInterface::STATE, &state)?;
         Ok(())
     }
@@ -150,27 +156,25 @@ impl Module for PayloadModule {
 impl PayloadModule {
     /// Carries on what the payload has to say: messages, a promise, news.
     fn serve(&mut self, context: &Context) {
-        for message in self.payload.take_messages() {
-            let (number, count) = match message.first() {
-                Some(b'H') => (HELLO, Some(&mut self.counts.hellos_sent)),
-                Some(b'R') if message.get(4) == Some(&1) => (RECORDS, Some(&mut self.counts.synchros_sent)),
-                Some(b'R') => (RECORDS, Some(&mut self.counts.records_sent)),
-                Some(b'T') => (TRAFFIC, None),
-                _ => (EVENT, None),
-            };
-            let sent = context.send_data(self.to, number, &message);
-            match (&sent, count) {
-                (Ok(()), Some(count)) => *count += 1,
-                (Ok(()), None) => {}
-                (Err(_), _) => self.counts.unsent += 1,
-            }
-            let trouble = sent.err().map(|error| format!("teammates do not hear this robot: {error}"));
-            self.trouble[0] = trouble.unwrap_or_default();
+        let messages = self.payload.take_messages();
+        if !messages.is_empty() {
+            self.trouble[0] = self.air.send(context, messages).unwrap_or_default();
         }
         if let Some(promise) = self.payload.take_promise() {
             self.promise(promise.command);
         }
         self.payload.take_news().iter().for_each(tell);
+        if self.payload.has_quit() && !self.has_quit {
+            self.quit();
+        }
+    }
+
+    /// Ends for good: the wormhole holds the robot, and launch starts this module no more.
+    fn quit(&mut self) {
+        let held = self.wormhole.begin_halt(QUIT_HALT, String::new());
+        let ended = self.launch.as_ref().map(|launch| launch.begin_stop(self.name.clone()));
+        // What does not reach them is tried with the next message.
+        self.has_quit = held.is_ok() && ended.is_none_or(|ended| ended.is_ok());
     }
 
     /// The destination first: a wormhole that misses the next promise drives there.
@@ -185,23 +189,6 @@ impl PayloadModule {
         let sent = self.wormhole.begin_promise(self.promise_ms, command.speed_m_s, command.turn_rate_rad_s);
         self.trouble[1] = sent.err().map(|error| format!("the wormhole gets no promises: {error}")).unwrap_or_default();
     }
-
-    /// Takes a message; one that is none, or in the name of another robot than its sender, is counted.
-    fn hear(&mut self, data: &Received<'_>) {
-        let is_own = data.from.system() == self.me.get();
-        let is_senders = sender(data.value).is_some_and(|from| from.get() == data.from.system());
-        // Of messages in its own name it takes hellos alone: they tell that another robot has the same number.
-        if is_own && data.number != HELLO {
-            return;
-        }
-        let heard = is_senders && self.payload.hear(self.clock.now_ns(), data.value).is_ok();
-        match (heard, data.number) {
-            (false, _) => self.counts.malformed += 1,
-            (true, HELLO) => self.counts.hellos_heard += u64::from(!is_own),
-            (true, RECORDS) => self.counts.records_heard += 1,
-            _ => {}
-        }
-    }
 }
 
 fn tell(news: &News) {
@@ -211,11 +198,15 @@ fn tell(news: &News) {
         News::Mode(mode) => tracing::info!("{mode} from now on"),
         News::Quit(from) => tracing::warn!("station {from} has told this robot to end"),
         News::Refused(from) => tracing::warn!("robot {from} is no station that this robot obeys"),
-        News::Report { from, text } => tracing::info!("robot {from}: {text}"),
+        News::Report { from, report: Report { text, .. } } => tracing::info!("robot {from}: {text}"),
     }
 }
 
-impl PayloadServer for PayloadModule {}
+impl PayloadServer for PayloadModule {
+    fn say(&mut self, text: String) {
+        self.payload.say(self.clock.now_ns(), text);
+    }
+}
 
 impl Team for PayloadModule {
     fn add_fake(&mut self, _: f64, _: f64) -> Result<TeamObjectId, TeamRefusal> {

@@ -4,6 +4,7 @@
 //! Each beat it looks around, sends what is new and a hello to system 255, and publishes its state. Whichever way there
 //! is carries the messages: the TCP router, or that of `[team]`.
 
+mod air;
 mod check;
 mod clock;
 mod settings;
@@ -12,6 +13,8 @@ pub(crate) mod store;
 mod surroundings;
 
 use super::settings::Settings as _;
+pub(crate) use air::Air;
+use air::{HELLO, MESSAGES, RECORDS, SLOTS};
 pub(super) use check::problems;
 pub(crate) use clock::OwnClock;
 use rohrpost_mailbox::{ALL_SYSTEMS, Name, Shape};
@@ -26,14 +29,6 @@ use state::TeamTold;
 use std::time::Duration;
 use store::Store;
 use surroundings::Surroundings;
-
-/// Mailbox for messages of teammates: local id 3.
-pub(crate) const MESSAGES: u8 = 3;
-/// Data numbers of the messages; 1 is the state.
-pub(crate) const HELLO: u16 = 2;
-pub(crate) const RECORDS: u16 = 3;
-/// Messages that may wait: several beats of a large team.
-pub(crate) const SLOTS: u16 = 256;
 
 pub(super) struct TeamModule {
     team: TeamCore,

@@ -1,15 +1,16 @@
 //! One robot's program.
 
-use crate::event::{Event, Request, Types};
+use crate::event::{Event, Types};
 use crate::ground::{Ground, position};
 use crate::journey::Navigation;
 use crate::mode::Mode;
+use crate::request::{Report, Request};
 use crate::settings::{RefusedSettings, Settings};
 use crate::state::{Fix, LostCause, News, Seen, State};
 use crate::tree;
 use rohrpost_modules::types::{LaserScan, Pose};
 use rohrpost_robot::lookout::Lookout;
-use rohrpost_supervision::{Order, Promise};
+use rohrpost_supervision::{Command, Order, Promise};
 use rohrpost_team::coordination::{Sharing, Traffic, TrafficMessage};
 use rohrpost_team::events::{EventHead, Refused, Tree};
 use rohrpost_team::grid::Cell;
@@ -95,13 +96,15 @@ impl Payload {
             outbox: Vec::new(),
             command: None,
             news: Vec::new(),
-            has_quit: false,
+            refused: None,
+            quit_beats: None,
         };
         Ok(Self { tree, types, state, order: Order { incarnation, sequence: 0 } })
     }
 
     /// The beat, twice a second or as the team's settings say.
     pub fn beat(&mut self, now_ns: u64) {
+        self.state.quit_beats = self.state.quit_beats.map(|beats| beats.saturating_sub(1));
         self.tree.hard(self.types.beat, Event::Beat);
         self.run(now_ns);
     }
@@ -149,7 +152,7 @@ impl Payload {
             }
             Some(b'E') => {
                 let (head, bytes) = EventHead::decode(message)?;
-                let event = Event::decode(head.event_type, bytes, self.types);
+                let event = Event::decode(&head, bytes, self.types);
                 self.tree.hear(&head, event.ok_or(NotHeard::Payload(head.event_type, head.from))?)?;
             }
             Some(b'T') => {
@@ -162,9 +165,15 @@ impl Payload {
         Ok(())
     }
 
-    /// A person at this station asks something of all mobiles.
+    /// A person at this station asks something of mobiles.
     pub fn ask(&mut self, now_ns: u64, request: Request) {
         self.tree.hard(self.types.command, Event::Request(request));
+        self.run(now_ns);
+    }
+
+    /// A person or program at this robot has a text for stations.
+    pub fn say(&mut self, now_ns: u64, text: String) {
+        self.tree.hard(self.types.command, Event::Report(Report { answers: None, text }));
         self.run(now_ns);
     }
 
@@ -187,6 +196,8 @@ impl Payload {
     /// The promise to the wormhole, if there is a new one.
     pub fn take_promise(&mut self) -> Option<Promise> {
         let command = self.state.command.take()?;
+        // A robot that is about to end stands.
+        let command = if self.state.quit_beats.is_some() { Command::STOP } else { command };
         self.order.sequence = self.order.sequence.wrapping_add(1);
         Some(Promise { order: self.order, duration_ns: self.state.settings.promise_ns, command })
     }
@@ -245,8 +256,12 @@ impl Payload {
         &self.state.team
     }
 
-    /// Whether a station has told it to end.
+    pub(crate) fn team_mut(&mut self) -> &mut Team {
+        &mut self.state.team
+    }
+
+    /// Whether it is to end now: a station has told it some beats ago, in which it has acknowledged that.
     pub fn has_quit(&self) -> bool {
-        self.state.has_quit
+        self.state.quit_beats == Some(0)
     }
 }

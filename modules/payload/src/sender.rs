@@ -16,7 +16,7 @@ pub fn sender(message: &[u8]) -> Option<RobotId> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Ground, Payload, Request, Settings};
+    use crate::{Ground, Payload, Settings};
     use std::sync::Arc;
 
     #[test]
@@ -26,7 +26,7 @@ mod tests {
         let (settings, me) = (Settings::default(), RobotId::new(7).unwrap());
         let team = settings.team(500_000_000, 3_750_000_000);
         let mut payload = Payload::new(0, me, 1, ground, settings, team, 1).unwrap();
-        payload.ask(0, Request::Info);
+        payload.say(0, "here".into());
         (1..20).for_each(|beat| payload.beat(beat * 500_000_000));
         let messages = payload.take_messages();
         let kinds: Vec<u8> = messages.iter().map(|message| message[0]).collect();

@@ -57,6 +57,8 @@ pub struct Settings {
     pub coordination: Option<TrafficSettings>,
     /// Stations that this robot obeys.
     pub stations: BTreeSet<RobotId>,
+    /// Whether this is a station: it obeys none.
+    pub is_station: bool,
 }
 
 impl Default for Settings {
@@ -74,6 +76,7 @@ impl Default for Settings {
             search_steps: 4,
             coordination: Some(TRAFFIC),
             stations: BTreeSet::new(),
+            is_station: false,
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::ground::Ground;
 use crate::journey::Navigation;
 use crate::mode::Mode;
+use crate::request::{Report, RequestId};
 use crate::settings::Settings;
 use rohrpost_modules::types::{LaserScan, Pose};
 use rohrpost_robot::lookout::Lookout;
@@ -45,12 +46,12 @@ pub enum News {
     Quit(RobotId),
     /// A robot that is no station of this team asked for something.
     Refused(RobotId),
-    /// A mobile has answered.
+    /// A mobile has answered, or has something to say.
     Report {
         /// The mobile.
         from: RobotId,
-        /// What a person reads.
-        text: String,
+        /// What it says.
+        report: Report,
     },
 }
 
@@ -93,7 +94,10 @@ pub(crate) struct State {
     pub(crate) outbox: Vec<Vec<u8>>,
     pub(crate) command: Option<Command>,
     pub(crate) news: Vec<News>,
-    pub(crate) has_quit: bool,
+    /// The last request that was refused: it is told once.
+    pub(crate) refused: Option<RequestId>,
+    /// A station has told it to end, after so many beats.
+    pub(crate) quit_beats: Option<u8>,
 }
 
 impl State {

@@ -106,6 +106,10 @@ pub struct PayloadState {
 /// robot knows of the others, the class `wormhole` which program drives.
 #[interface(class = "payload", crate = crate::macro_support)]
 pub trait Payload {
+    /// Tells all stations a text, at most 1000 characters of it.
+    #[command(16)]
+    fn say(&mut self, text: String);
+
     /// The robot's program, each beat.
     #[data(1)]
     fn state() -> PayloadState;

@@ -17,7 +17,6 @@ mod live;
 mod map;
 mod model;
 mod output;
-mod terminal;
 #[cfg(test)]
 mod tests;
 mod text;
