@@ -12,7 +12,7 @@
 //!   marks            what robots must not do; marks stay
 //! ```
 //!
-//! A robot is drawn once, whatever systems tell of it ([`known`]). The flat world has a transform that turns y up, which
+//! A robot is drawn once, whatever systems tell of it ([`known`]). The flat world has a transform that turns y up. That
 //! would mirror what has three dimensions; so this is beside it, with z up.
 
 mod floor;
