@@ -189,7 +189,7 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Time(arguments) => time::run(&arguments),
         Command::Team(arguments) => members::run(&arguments),
-        Command::Wormhole(arguments) => two_files::start(&arguments, two_files::Host::Mobile),
+        Command::Wormhole(arguments) => two_files::start(&arguments, two_files::TeamProgram::Mobile),
         Command::Station(arguments) => station::run(&arguments),
         Command::Path(arguments) => path::run(&arguments),
         Command::Entrances(arguments) => entrances::run(&arguments),

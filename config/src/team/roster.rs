@@ -53,7 +53,7 @@ pub struct RosterMistake {
 pub fn roster(text: &[u8], own: u8) -> Result<Vec<TeamHost>, Vec<RosterMistake>> {
     // Some editors begin a file with a mark of its byte order.
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    let (mut reader, mut lines) = (Reader::default(), 0);
+    let (mut reader, mut lines) = (RosterReader::default(), 0);
     for (line, number) in text.split(|byte| *byte == b'\n').zip(1..) {
         lines = number;
         match str::from_utf8(line) {
@@ -64,7 +64,7 @@ pub fn roster(text: &[u8], own: u8) -> Result<Vec<TeamHost>, Vec<RosterMistake>>
             }
         }
     }
-    let Reader { hosts, mut mistakes } = reader;
+    let RosterReader { hosts, mut mistakes } = reader;
     if mistakes.is_empty() && !hosts.iter().any(|(host, _)| host.id == own) {
         let ids: Vec<String> = hosts.iter().map(|(host, _)| host.id.to_string()).collect();
         let others = if ids.is_empty() { "none".into() } else { ids.join(", ") };
@@ -75,7 +75,7 @@ pub fn roster(text: &[u8], own: u8) -> Result<Vec<TeamHost>, Vec<RosterMistake>>
 }
 
 #[derive(Default)]
-struct Reader {
+struct RosterReader {
     /// With their lines.
     hosts: Vec<(TeamHost, usize)>,
     mistakes: Vec<RosterMistake>,
@@ -84,7 +84,7 @@ struct Reader {
 /// A word, and its column.
 type Word<'a> = (usize, &'a str);
 
-impl Reader {
+impl RosterReader {
     fn tell(&mut self, line: usize, column: usize, what: String) {
         self.mistakes.push(RosterMistake { line, column, what });
     }

@@ -18,7 +18,7 @@
 //!   ([`rohrpost_team::coordination`]). Without it each plans for itself, as in the seed.
 //! - Cells are places on a continuous floor: the pilot steers along the line from middle to middle.
 //!
-//! [`Station`] is a person's place in the team: it has the same tree, so that robots understand its events, and no body.
+//! [`Station`] is a person's place in the team: it has the same tree, so that robots know its events, and no body.
 //!
 //! Time is an argument, and chance comes from a seed. Nothing here reads a clock, sends, or waits.
 

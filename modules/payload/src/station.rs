@@ -33,7 +33,9 @@ const SAID_MAX: usize = 100;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum StationRefusal {
     /// A place off all paths.
-    #[error("an intruder cannot be at {} mm, {} mm: that is on no path of the map; name a place on one", .0.x_mm, .0.y_mm)]
+    #[error(
+        "an intruder cannot be at {} mm, {} mm: that is on no path of the map; name a place on one", .0.x_mm, .0.y_mm
+    )]
     NoPath(Position),
     /// As many as there may be.
     #[error("this station has made up {FAKES_MAX} intruders; remove one first")]

@@ -92,8 +92,8 @@ pub struct StationState {
     pub more_messages: u32,
 }
 
-/// A person's place in a team: takes part without a body, and never holds an exit. The class `team` beside it tells what
-/// it knows of the others.
+/// A person's place in a team: takes part without a body, and never holds an exit. The class `team` beside it tells
+/// what it knows of the others.
 #[interface(class = "station", crate = crate::macro_support)]
 pub trait Station {
     /// Makes up an intruder at a place of the team's map; all show it as fake. Only `remove_fake` ends it.
@@ -108,8 +108,8 @@ pub trait Station {
     #[command(18)]
     fn remove_fake(&mut self, id: TeamObjectId) -> Result<(), TeamRefusal>;
 
-    /// Asks something of one robot, or of all that are heard, until each has answered or is given up. Returns the number
-    /// of the request.
+    /// Asks something of one robot, or of all that are heard, until each has answered or is given up. Returns the
+    /// number of the request.
     #[command(19)]
     fn ask(&mut self, kind: StationRequestKind, robot: Option<u8>) -> Result<u32, TeamRefusal>;
 

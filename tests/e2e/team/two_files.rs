@@ -32,7 +32,8 @@ fn drivers(id: u8, cell: &str) -> String {
         "[[module]]\nname = \"arena.0\"\nbuiltin = \"arena\"\nsettings = {{ map = \"lab.map\", cell-m = 1.0, socket = \
          \"arena{id}.sock\", robots = [{{ id = {system}, cell = \"{cell}\" }}] }}\n[[module]]\nname = \
          \"motor.1\"\naliases = [\"odometry.0\", \"laser.0\"]\nbuiltin = \"body\"\nsettings = {{ arena = \
-         \"arena{id}.sock\" }}\n[module.mailbox.commands]\nmax-age = \"100 ms\"\n[module.stream.odometry]\nrecord = \"128 B\"\n"
+         \"arena{id}.sock\" }}\n[module.mailbox.commands]\nmax-age = \"100 ms\"\n\
+         [module.stream.odometry]\nrecord = \"128 B\"\n"
     )
 }
 
@@ -144,7 +145,7 @@ fn robots_and_a_station_work_from_two_files_and_strangers_take_no_part() {
     let known = format!("{name} true");
     computers.knows(0, &[&known]);
     computers.knows(3, &[&known]);
-    assert_has(&computers.says(3, &["team"]).ok(), ["made up"]);
+    assert_has(&computers.says(3, &["team"]).out, ["made up"]);
     computers.says(STATION, &["station", "fake", "set", "0.5", "0.5"]).fails_with(["on no path of the map"]);
     until("both block it", || {
         let told: Value =
@@ -198,8 +199,8 @@ fn mistakes_of_the_two_files_are_told_with_line_column_and_what_would_be_right()
         ),
         (
             &["0", "bad.map", "hosts", "--insecure"],
-            "bad.map: line 3, column 3: `#` is no square; expected `*` (wall), `.` (path), a blank (neither), `R` (robot) \
-             or `I` (intruder)\n",
+            "bad.map: line 3, column 3: `#` is no square; expected `*` (wall), `.` (path), a blank (neither), `R` \
+             (robot) or `I` (intruder)\n",
         ),
         (
             &["0", "lab.map", "bad", "--insecure"],

@@ -17,7 +17,7 @@ const POLL: Duration = Duration::from_millis(100);
 #[derive(clap::Args)]
 #[command(after_help = "Example: rohrpost station info 4\nExit code 1: a robot did not answer, or does not obey this \
     station.")]
-pub(super) struct InfoArguments {
+pub(super) struct StationInfoArguments {
     /// The robot; without it, all that are heard.
     robot: Option<u8>,
     #[command(flatten)]
@@ -43,13 +43,13 @@ pub(super) struct QuitArguments {
 
 /// How it stands with one robot, for programs.
 #[derive(Serialize)]
-struct Outcome<'a> {
+struct RobotOutcome<'a> {
     robot: u8,
     answer: StationAnswer,
     text: &'a str,
 }
 
-pub(super) fn info(arguments: &InfoArguments) -> Result<ExitCode, Failure> {
+pub(super) fn info(arguments: &StationInfoArguments) -> Result<ExitCode, Failure> {
     ask(&arguments.inquiry, StationRequestKind::Info, arguments.robot)
 }
 
@@ -76,9 +76,10 @@ fn tell(json: bool, state: &StationState, request: &StationRequest) -> Result<Ex
         let said = said.find(|said| said.robot == robot && said.answers == Some(request.number));
         said.map(|said| said.text.as_str()).unwrap_or_default()
     };
-    let outcomes = request.robots.iter().map(|it| Outcome { robot: it.robot, answer: it.answer, text: text(it.robot) });
-    let outcomes: Vec<Outcome<'_>> = outcomes.collect();
-    let is_good = |outcome: &&Outcome<'_>| matches!(outcome.answer, StationAnswer::Done | StationAnswer::Station);
+    let outcomes =
+        request.robots.iter().map(|it| RobotOutcome { robot: it.robot, answer: it.answer, text: text(it.robot) });
+    let outcomes: Vec<RobotOutcome<'_>> = outcomes.collect();
+    let is_good = |outcome: &&RobotOutcome<'_>| matches!(outcome.answer, StationAnswer::Done | StationAnswer::Station);
     let code = if outcomes.iter().all(|it| is_good(&it)) { ExitCode::SUCCESS } else { ExitCode::FAILURE };
     if json {
         say(serde_json::to_string(&outcomes)?);
@@ -91,8 +92,8 @@ fn tell(json: bool, state: &StationState, request: &StationRequest) -> Result<Ex
     Ok(code)
 }
 
-fn line(outcome: &Outcome<'_>, request: &StationRequest) -> String {
-    let Outcome { robot, answer, text } = outcome;
+fn line(outcome: &RobotOutcome<'_>, request: &StationRequest) -> String {
+    let RobotOutcome { robot, answer, text } = outcome;
     match answer {
         StationAnswer::Done => format!("robot {robot}: {text}"),
         StationAnswer::Station => format!("robot {robot} is a station: not meant"),
@@ -118,7 +119,7 @@ mod tests {
             (StationAnswer::Restarted, "", "robot 4 was restarted meanwhile: ask again"),
             (StationAnswer::GivenUp, "", "robot 4 has NOT ANSWERED, asked 20 times: what it does, nobody knows"),
         ] {
-            assert_eq!(line(&Outcome { robot: 4, answer, text }, &request), told);
+            assert_eq!(line(&RobotOutcome { robot: 4, answer, text }, &request), told);
         }
     }
 }

@@ -22,16 +22,16 @@ pub(super) const REMOVE: u16 = 18;
 Places are metres on the team's map. All show it as fake, and only this station moves or removes it.")]
 pub(super) struct Arguments {
     #[command(subcommand)]
-    command: Command,
+    command: FakeCommand,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum FakeCommand {
     /// Make one up; prints its name.
     #[command(after_help = "Example: rohrpost station fake set 6.5 1.5")]
     Set {
         #[command(flatten)]
-        place: Place,
+        place: FakePlace,
         #[command(flatten)]
         inquiry: Inquiry,
     },
@@ -41,7 +41,7 @@ enum Command {
         /// Name of the intruder, as `rohrpost team` shows it.
         name: FakeName,
         #[command(flatten)]
-        place: Place,
+        place: FakePlace,
         #[command(flatten)]
         inquiry: Inquiry,
     },
@@ -56,7 +56,7 @@ enum Command {
 }
 
 #[derive(clap::Args)]
-struct Place {
+struct FakePlace {
     /// Metres along x.
     #[arg(allow_negative_numbers = true)]
     x_m: f64,
@@ -94,15 +94,15 @@ pub(super) fn name(id: TeamObjectId) -> String {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let (inquiry, id, what) = match &arguments.command {
-        Command::Set { place, inquiry } => {
+        FakeCommand::Set { place, inquiry } => {
             let id = StationLink::find(inquiry)?.call(SET, &(place.x_m, place.y_m))?;
             (inquiry, id, "set")
         }
-        Command::Move { name: FakeName(id), place, inquiry } => {
+        FakeCommand::Move { name: FakeName(id), place, inquiry } => {
             StationLink::find(inquiry)?.call::<()>(MOVE, &(id, place.x_m, place.y_m))?;
             (inquiry, *id, "moved")
         }
-        Command::Remove { name: FakeName(id), inquiry } => {
+        FakeCommand::Remove { name: FakeName(id), inquiry } => {
             StationLink::find(inquiry)?.call::<()>(REMOVE, &(id,))?;
             (inquiry, *id, "removed")
         }

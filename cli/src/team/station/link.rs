@@ -27,7 +27,11 @@ impl StationLink {
     }
 
     /// Calls a function that may refuse.
-    pub(super) fn call<T: DeserializeOwned>(&mut self, function: u16, arguments: &impl Serialize) -> Result<T, Failure> {
+    pub(super) fn call<T: DeserializeOwned>(
+        &mut self,
+        function: u16,
+        arguments: &impl Serialize,
+    ) -> Result<T, Failure> {
         let write = |body: &mut Vec<u8>| append(body, arguments);
         let read = |bytes: &[u8]| from_bytes::<Result<T, TeamRefusal>>(bytes);
         let answer = self.tool.call(self.module, function, StationInterface::hash(), write, read);

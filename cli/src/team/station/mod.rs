@@ -15,17 +15,17 @@ use std::process::ExitCode;
     them: in a hosts file, one more than the id.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
-    command: Command,
+    command: StationCommand,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum StationCommand {
     /// Start a station from the team's two files.
     Start(two_files::Arguments),
     /// Show the team live, on its map.
     Watch(watch::Arguments),
     /// Ask robots what they do and see.
-    Info(ask::InfoArguments),
+    Info(ask::StationInfoArguments),
     /// Tell robots to end.
     Quit(ask::QuitArguments),
     /// Make up intruders, move and remove them.
@@ -34,10 +34,10 @@ enum Command {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.command {
-        Command::Start(arguments) => two_files::start(arguments, two_files::Host::Station),
-        Command::Watch(arguments) => watch::run(arguments),
-        Command::Info(arguments) => ask::info(arguments),
-        Command::Quit(arguments) => ask::quit(arguments),
-        Command::Fake(arguments) => fake::run(arguments),
+        StationCommand::Start(arguments) => two_files::start(arguments, two_files::TeamProgram::Station),
+        StationCommand::Watch(arguments) => watch::run(arguments),
+        StationCommand::Info(arguments) => ask::info(arguments),
+        StationCommand::Quit(arguments) => ask::quit(arguments),
+        StationCommand::Fake(arguments) => fake::run(arguments),
     }
 }

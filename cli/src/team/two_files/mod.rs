@@ -1,5 +1,5 @@
-//! Programs of a team that start from its two files alone: `wormhole ID MAP HOSTS` and `station ID MAP HOSTS` (seed 000,
-//! A.4). Both are the command `rohrpost`, also under these names.
+//! Programs of a team that start from its two files alone: `wormhole ID MAP HOSTS` and `station ID MAP HOSTS` (seed
+//! 000, A.4). Both are the command `rohrpost`, also under these names.
 //!
 //! ```text
 //!  mobile.toml or station.toml ─┐
@@ -59,7 +59,7 @@ pub(crate) struct Arguments {
 
 /// What is started.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Host {
+pub(crate) enum TeamProgram {
     Mobile,
     Station,
 }
@@ -80,7 +80,7 @@ pub(crate) fn by_name(words: impl IntoIterator<Item = OsString>) -> Vec<OsString
 }
 
 /// Starts it, and runs until it is told to end: by a signal, or a mobile by its station.
-pub(crate) fn start(arguments: &Arguments, host: Host) -> Result<ExitCode, Failure> {
+pub(crate) fn start(arguments: &Arguments, host: TeamProgram) -> Result<ExitCode, Failure> {
     let made = Made::new(arguments, host)?;
     let folder = Folder::new()?;
     // Paths of FILE are relative to its folder.
@@ -98,7 +98,7 @@ struct Made {
 }
 
 impl Made {
-    fn new(arguments: &Arguments, host: Host) -> Result<Self, Failure> {
+    fn new(arguments: &Arguments, host: TeamProgram) -> Result<Self, Failure> {
         let map = Map::read(&read(&arguments.map)?).map_err(|error| at(&arguments.map, &error))?;
         let cells = arguments.cell_m;
         if !(cells.is_finite() && cells > 0.0) {
@@ -109,20 +109,20 @@ impl Made {
             lines.join("\n")
         })?;
         let template = match host {
-            Host::Mobile => include_str!("mobile.toml"),
-            Host::Station => include_str!("station.toml"),
+            TeamProgram::Mobile => include_str!("mobile.toml"),
+            TeamProgram::Station => include_str!("station.toml"),
         };
         let mut made: Table = include_str!("classes.toml").parse()?;
         merge(&mut made, template.parse()?);
         let is_sealed = arguments.secure(&mut made, &hosts)?;
-        arguments.take_part(&mut made, map.cell_m.is_none(), host == Host::Mobile && is_sealed, &hosts)?;
+        arguments.take_part(&mut made, map.cell_m.is_none(), host == TeamProgram::Mobile && is_sealed, &hosts)?;
         let mut notes = Vec::new();
         match &arguments.config {
             Some(file) => {
                 let text = String::from_utf8(read(file)?).map_err(|error| at(file, &error))?;
                 merge(&mut made, text.parse::<Table>().map_err(|error| at(file, &error))?);
             }
-            None if host == Host::Mobile => {
+            None if host == TeamProgram::Mobile => {
                 notes.push("no --config with drivers: a simulated body drives, in a world of its own");
                 arguments.simulate(&mut made, &map)?;
             }

@@ -8,7 +8,7 @@
 //! arrows, f m x i Q q                                                  keys, or what came of the last one
 //! ```
 
-use super::ground::Ground;
+use super::ground::StationGround;
 use crate::team::members;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -20,7 +20,7 @@ use rohrpost_team::grid::{Cell, Square};
 const KEYS: &str = "arrows move the mark   f fake  m move it  x remove   i info  Q quit all   q end";
 
 pub(super) struct Watched<'a> {
-    pub(super) ground: &'a Ground,
+    pub(super) ground: &'a StationGround,
     pub(super) team: &'a TeamState,
     pub(super) station: &'a StationState,
     pub(super) mark: Cell,

@@ -13,12 +13,12 @@ struct MapSettings {
     cell_m: Option<f64>,
 }
 
-pub(super) struct Ground {
+pub(super) struct StationGround {
     grid: Grid,
     placement: Placement,
 }
 
-impl Ground {
+impl StationGround {
     pub(super) fn read(link: &StationLink) -> Result<Self, Failure> {
         let installation = &link.running.installation;
         let module = installation.module(link.module).ok_or("the configuration has no such station")?;

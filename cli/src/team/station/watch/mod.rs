@@ -15,7 +15,7 @@ use crate::look::target::Inquiry;
 use crate::terminal::Failure;
 use crate::terminal::raw::{RawTerminal, keyboard};
 use draw::Watched;
-use ground::Ground;
+use ground::StationGround;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyCode, KeyEventKind, KeyModifiers};
 use rohrpost::interface::Interface;
@@ -58,7 +58,7 @@ struct Person {
     link: StationLink,
     /// The station, under the name that tells of the team.
     member: Name,
-    ground: Ground,
+    ground: StationGround,
     team: TeamState,
     station: StationState,
     mark: Cell,
@@ -71,7 +71,7 @@ struct Person {
 
 impl Person {
     fn new(mut link: StationLink) -> Result<Self, Failure> {
-        let ground = Ground::read(&link)?;
+        let ground = StationGround::read(&link)?;
         let member = link.running.module(TeamInterface::CLASS)?;
         let station = link.state()?;
         let (mark, said) = (ground.first_path(), String::new());
