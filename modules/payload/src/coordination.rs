@@ -9,7 +9,7 @@ use rohrpost_team::coordination::{Duty, Target, Traffic};
 use rohrpost_team::grid::Cell;
 
 /// So near to the middle of its cell, all of the robot's body is in it, metres.
-const IN_CELL_M: f64 = 0.2;
+const IN_CELL_M: f64 = 0.24;
 /// A robot that does not come to the cell that it enters for so long turns back, ns.
 const TURN_BACK_NS: u64 = 6_000_000_000;
 /// Another goal is chosen after so long, ns.

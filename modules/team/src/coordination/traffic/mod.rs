@@ -199,18 +199,20 @@ impl Traffic {
         Some(message)
     }
 
-    /// Whether a message has to go at once. Echoes for robots that do not wait for them, and digests of what is not all,
-    /// go with the next one.
+    /// Whether a message has to go at once. Echoes for robots that do not wait for them go with the next one.
     fn is_news(&self, now_ns: u64, message: &TrafficMessage) -> bool {
         let Some((sent, at_ns)) = &self.sent else { return true };
         let (version, echoes) = (sent.version, sent.echoes.clone());
-        let knows_all = self.claims.placed(now_ns).all(|(_, other)| other.round == self.round);
-        let digest = if knows_all { message.digest } else { sent.digest };
         let is_waited_for =
             |(robot, number): (&RobotId, &u32)| sent.echoes.get(robot) != Some(number) && self.claims.is_near(*robot);
-        TrafficMessage { version, echoes, digest, ..message.clone() } != *sent
+        TrafficMessage { version, echoes, ..message.clone() } != *sent
             || message.echoes.iter().any(is_waited_for)
             || now_ns.saturating_sub(*at_ns) >= self.settings.beat_ns
+    }
+
+    /// Whether all that are heard take part in this round: before that, nobody knows what all plan from.
+    fn all_take_part(&self, now_ns: u64) -> bool {
+        self.claims.placed(now_ns).all(|(_, message)| message.round == self.round)
     }
 
     fn stands_still(&self) -> bool {
@@ -254,22 +256,24 @@ impl Traffic {
         let place = self.claims.here().filter(|_| self.claims.entering().is_none());
         let was_pushed = place.is_some_and(|here| !agreed.plan.is_at(self.me, self.moment, here));
         has_stopped
-            || is_other && is_time
+            || (is_other || is_other_team) && is_time
             || was_pushed
-            || is_other_team
             || has_stalled && agreed.plan.wants_more(self.me, self.moment)
     }
 
     /// Plans if all know the same, or do not come to for too long.
     fn agree(&mut self, now_ns: u64, planner: &mut Planner) {
         let Some((stance, since_ns)) = self.stance.filter(|_| self.plan.is_none()) else { return };
+        let since_ns = since_ns.max(self.claims.has_listened_ns());
+        let is_late = now_ns > since_ns.saturating_add(self.settings.agree_ns);
+        if now_ns < self.claims.has_listened_ns() || !is_late && !self.all_take_part(now_ns) {
+            return;
+        }
         let known = self.known(now_ns, stance);
         let digest = known.digest();
         let mut others = self.claims.placed(now_ns).map(|(_, message)| message);
         let agrees = others.all(|message| message.round == self.round && message.digest == digest);
-        let since_ns = since_ns.max(self.claims.has_listened_ns());
-        let is_late = now_ns > since_ns.saturating_add(self.settings.agree_ns);
-        if now_ns >= self.claims.has_listened_ns() && (agrees || is_late) {
+        if agrees || is_late {
             let plan = planner.plan(&known, self.settings.looks_max);
             self.post = plan.sharing.as_ref().and_then(|sharing| match sharing.duties.get(&self.me) {
                 Some(Duty::Hold { post, .. }) => Some(*post),
@@ -317,7 +321,8 @@ impl Traffic {
 
     fn message(&self, now_ns: u64) -> TrafficMessage {
         let stance = self.stance.map(|(stance, _)| stance);
-        let now_known = || stance.map_or(0, |stance| self.known(now_ns, stance).digest());
+        let takes_part = stance.filter(|_| self.plan.is_none() && self.all_take_part(now_ns));
+        let now_known = || takes_part.map_or(0, |stance| self.known(now_ns, stance).digest());
         TrafficMessage {
             from: self.me,
             version: self.version,
