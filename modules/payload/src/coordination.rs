@@ -14,6 +14,8 @@ const IN_CELL_M: f64 = 0.24;
 const TURN_BACK_NS: u64 = 6_000_000_000;
 /// Another goal is chosen after so long, ns.
 const GOAL_NS: u64 = 40_000_000_000;
+/// Goals are looked for no more often, ns.
+const CHOICE_NS: u64 = 1_000_000_000;
 /// Another goal is chosen so many steps before this one, so that all have agreed on ways to it when the robot is there.
 const STEPS_AHEAD: usize = 2;
 
@@ -85,7 +87,9 @@ fn goal(state: &mut State, traffic: &Traffic, now_ns: u64) -> Option<Cell> {
     let here = state.cell()?;
     let is_near = traffic.steps_left().is_some_and(|steps| steps <= STEPS_AHEAD);
     let is_over = |(_, since_ns): (Cell, u64)| is_near || now_ns.saturating_sub(since_ns) > GOAL_NS;
-    if state.navigation.destination.is_none_or(is_over) {
+    let is_time = state.navigation.chose_ns.is_none_or(|at_ns| now_ns.saturating_sub(at_ns) >= CHOICE_NS);
+    if is_time && state.navigation.destination.is_none_or(is_over) {
+        state.navigation.chose_ns = Some(now_ns);
         let others: Vec<Cell> = traffic.others(now_ns).collect();
         let near = match state.mode {
             Mode::Searching => {
