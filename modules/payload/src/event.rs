@@ -48,6 +48,14 @@ pub(crate) struct Types {
     pub(crate) report: EventType,
 }
 
+impl Types {
+    /// All of them.
+    pub(crate) fn all(&self) -> impl Iterator<Item = EventType> {
+        let Self { beat, pose, obstacle, object, heard, synchro, traffic, moved, command, request, report } = *self;
+        [beat, pose, obstacle, object, heard, synchro, traffic, moved, command, request, report].into_iter()
+    }
+}
+
 impl Event {
     /// The bytes behind the head; `None` of an event that does not leave its robot.
     pub(crate) fn encode(&self) -> Option<Vec<u8>> {

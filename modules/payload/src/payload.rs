@@ -12,7 +12,7 @@ use rohrpost_modules::types::{LaserScan, Pose};
 use rohrpost_robot::lookout::Lookout;
 use rohrpost_supervision::{Command, Order, Promise};
 use rohrpost_team::coordination::{Sharing, Traffic, TrafficMessage};
-use rohrpost_team::events::{EventHead, Refused, Tree};
+use rohrpost_team::events::{EventHead, LossCause, Priority, Refused, Tree};
 use rohrpost_team::grid::Cell;
 use rohrpost_team::group::Hello;
 use rohrpost_team::view::Records;
@@ -90,6 +90,7 @@ impl Payload {
             fix: None,
             seen: None,
             lost: Some(LostCause::NoPose),
+            no_way: None,
             mode: Mode::default(),
             is_obstructed: false,
             navigation: Navigation::new(seed ^ u64::from(me.get())),
@@ -249,6 +250,16 @@ impl Payload {
     /// What robots do about intruders, and exits that nobody holds; `None` without intruder, plan or coordination.
     pub fn sharing(&self) -> Option<&Sharing> {
         self.state.traffic.as_ref().and_then(Traffic::sharing)
+    }
+
+    /// How many events of a priority waited for leaves at a time at most.
+    pub fn queued_most(&self, priority: Priority) -> usize {
+        self.tree.queued_most(priority)
+    }
+
+    /// Events that were lost because their queues were full.
+    pub fn events_lost(&self) -> u64 {
+        self.types.all().map(|it| self.tree.lost(it, LossCause::QueueFull)).sum()
     }
 
     /// What it knows of its team.

@@ -16,6 +16,7 @@ const TRAFFIC: TrafficSettings = TrafficSettings {
     claim_ns: 3_000_000_000,
     stall_ns: 5_000_000_000,
     agree_ns: 3_000_000_000,
+    extend_ns: 2_000_000_000,
     looks_max: 2000,
 };
 

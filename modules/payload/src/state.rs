@@ -8,7 +8,7 @@ use crate::settings::Settings;
 use rohrpost_modules::types::{LaserScan, Pose};
 use rohrpost_robot::lookout::Lookout;
 use rohrpost_supervision::Command;
-use rohrpost_team::coordination::Traffic;
+use rohrpost_team::coordination::{NoWays, Traffic};
 use rohrpost_team::grid::Cell;
 use rohrpost_team::view::Object;
 use rohrpost_team::{Position, RobotId, Team};
@@ -42,6 +42,8 @@ pub enum News {
     Found(Cell),
     /// From now on it does this.
     Mode(Mode),
+    /// The robot has no way to where it should be.
+    NoWay(NoWays),
     /// A station has told it to end.
     Quit(RobotId),
     /// A robot that is no station of this team asked for something.
@@ -87,6 +89,8 @@ pub(crate) struct State {
     pub(crate) fix: Option<Fix>,
     pub(crate) seen: Option<Seen>,
     pub(crate) lost: Option<LostCause>,
+    /// Why it has no way, as was told.
+    pub(crate) no_way: Option<NoWays>,
     pub(crate) mode: Mode,
     /// Something is near, in front of the robot.
     pub(crate) is_obstructed: bool,
