@@ -196,9 +196,9 @@ fn told(happened: &[TeamHappening]) -> String {
     };
     let heads = [">at", "what happened", ">group after beats", ">promised", ">equal views", ">promised"];
     format!(
-        "{}Promised without loss: {MERGE_BEATS} beats until all know leader and group, {VIEW_BEATS} more until views \
-         are equal, {HEAR_BEATS} until all have heard that, {LOOK_BEATS} until they tell it; {AGE_BEATS} before where \
-         robots fell silent.",
+        "{}Promised without loss: {MERGE_BEATS} beats until all know leader and group, {VIEW_BEATS} more\n\
+         until views are equal, {HEAR_BEATS} until all have heard that, {LOOK_BEATS} until they tell it;\n\
+         {AGE_BEATS} before where robots fell silent.",
         table(heads, happened.iter().map(row))
     )
 }
