@@ -52,7 +52,8 @@ fn walks_of(left: Bounds) {
 
 /// A robot that has changed places with another one does what that would do.
 pub(crate) fn walks_of_changed_places() {
-    let left = Bounds { story: Story::Nothing, may_lose: Loss::Anything, may_delay: true, may_die: true, calm_max: PAIRS };
+    let left =
+        Bounds { story: Story::Nothing, may_lose: Loss::Anything, may_delay: true, may_die: true, calm_max: PAIRS };
     let model = Teams { first: begun(left, 0, 0) };
     for walk in 0..WALKS {
         let mut chance = ChaCha8Rng::seed_from_u64(walk);
