@@ -303,8 +303,8 @@ impl Place {
 
     /// The same, from a node of this configuration.
     pub(crate) fn say_at(&self, config: &Path, node: &str, arguments: &[&str]) -> Said {
-        let (command, rest) = arguments.split_first().unwrap();
-        self.say(&[&[*command, "--config", config.to_str().unwrap(), "--node", node], rest].concat())
+        let (command, rest) = arguments.split_at(if matches!(arguments[0], "param" | "stream") { 2 } else { 1 });
+        self.say(&[command, &["--config", config.to_str().unwrap(), "--node", node], rest].concat())
     }
 
     /// Starts `rohrpost launch`.

@@ -23,18 +23,31 @@ impl BareRobot {
     /// # Errors
     /// When that is refused.
     pub fn open(own: Ipv4Addr, bytes: usize) -> Result<Self, Failure> {
-        let group: SocketAddrV4 = GROUP.parse().or_fail("address of the group")?;
-        let listens = socket(AddressFamily::Inet, SockType::Datagram, SockFlag::empty(), None).or_fail("socket")?;
-        setsockopt(&listens, sockopt::ReuseAddr, &true).or_fail("socket")?;
-        bind(listens.as_raw_fd(), &SockaddrIn::from(group)).or_fail("socket")?;
-        let listens = UdpSocket::from(listens);
-        listens.join_multicast_v4(group.ip(), &own).or_fail("group")?;
-        listens.set_read_timeout(Some(LOOK)).or_fail("socket")?;
-        // The source's address says by which device it goes.
-        let speaks = UdpSocket::bind((own, 0)).or_fail("socket")?;
-        speaks.connect(group).or_fail("socket")?;
-        Ok(Self { speaks, listens, room: vec![0; bytes + 1] })
+        Ok(Self { speaks: speaker(own)?, listens: listener(own)?, room: vec![0; bytes + 1] })
     }
+}
+
+fn group() -> Result<SocketAddrV4, Failure> {
+    GROUP.parse().or_fail("address of the group")
+}
+
+/// A socket that hears the group at this address.
+pub(super) fn listener(own: Ipv4Addr) -> Result<UdpSocket, Failure> {
+    let group = group()?;
+    let listens = socket(AddressFamily::Inet, SockType::Datagram, SockFlag::empty(), None).or_fail("socket")?;
+    setsockopt(&listens, sockopt::ReuseAddr, &true).or_fail("socket")?;
+    bind(listens.as_raw_fd(), &SockaddrIn::from(group)).or_fail("socket")?;
+    let listens = UdpSocket::from(listens);
+    listens.join_multicast_v4(group.ip(), &own).or_fail("group")?;
+    listens.set_read_timeout(Some(LOOK)).or_fail("socket")?;
+    Ok(listens)
+}
+
+/// A socket that sends to the group from this address, which says by which device.
+pub(super) fn speaker(own: Ipv4Addr) -> Result<UdpSocket, Failure> {
+    let speaks = UdpSocket::bind((own, 0)).or_fail("socket")?;
+    speaks.connect(group()?).or_fail("socket")?;
+    Ok(speaks)
 }
 
 impl Sink for BareRobot {

@@ -92,7 +92,7 @@ fn what_a_scanner_sees_is_an_intruder_for_all_and_a_silent_teammate_may_be_one()
         let is_suspected = |object: &Value| object["may_be"] == 3 && is_at(object, TEAMMATE);
         states.iter().all(|state| objects(state).iter().any(is_suspected))
     });
-    let shown = robots.says("r2", &["team"]).ok();
+    let shown = robots.says("r2", &["team"]).out;
     assert_has(&shown, ["out of contact", "may be robot 3, silent for ", "certain"]);
 
     robots.launch("r3");

@@ -6,6 +6,7 @@ use crate::lan::ends::Module;
 use crate::lan::nodes::{ETHERNET, UNPACED};
 use crate::lan::wire::{Wire, address};
 use crate::team::bare::BareRobot;
+use crate::team::relay::Relays;
 use crate::team::robots::{Chatter, OurRobot};
 use crate::team::systems::{TeamSystems, bench};
 use rohrpost_bench_local::Case;
@@ -49,6 +50,7 @@ fn hellos() -> Case {
         let contenders = [
             Contender::single("rohrpost", || team.cost(&chatter)),
             Contender::single("bare datagrams", || team.bare_cost(&chatter)).beside(at_most(3.0), None),
+            Contender::single("bare relays", || team.relay_cost(&chatter)),
         ];
         Ok(compare(settings, subject, &contenders))
     })
@@ -107,6 +109,14 @@ impl TeamGround {
     fn cost(&self, chatter: &Chatter) -> Result<f64, Failure> {
         let (systems, turn) = self.turn()?;
         chatter.cost(&systems.pids(), |system| OurRobot::open(systems, system, turn, chatter.bytes))
+    }
+
+    /// Of processes that hand datagrams over to robots, and nothing else: what any router costs.
+    fn relay_cost(&self, chatter: &Chatter) -> Result<f64, Failure> {
+        let wire = self.wire.as_ref().map_err(Clone::clone)?;
+        let enter = || wire.enter(End::Pong);
+        let relays = Relays::start(chatter.robots, LOOPBACK, chatter.bytes, enter)?;
+        chatter.cost(&relays.pids(), |system| enter().and_then(|()| relays.robot(system)))
     }
 
     /// Of sockets without routers; they are on another node, so that neither hears the other.
