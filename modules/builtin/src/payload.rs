@@ -196,6 +196,7 @@ fn tell(news: &News) {
         News::Lost(cause) => tracing::warn!("lost, and stands: {cause}"),
         News::Found(cell) => tracing::info!("knows its cell again: {cell}"),
         News::Mode(mode) => tracing::info!("{mode} from now on"),
+        News::NoWay(why) => tracing::warn!("no way to where it should be: {why}"),
         News::Quit(from) => tracing::warn!("station {from} has told this robot to end"),
         News::Refused(from) => tracing::warn!("robot {from} is no station that this robot obeys"),
         News::Report { from, report: Report { text, .. } } => tracing::info!("robot {from}: {text}"),
