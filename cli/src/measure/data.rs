@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
 
 /// What modules publish.
 #[derive(Serialize)]
-struct Listing {
+struct DataListing {
     installation: String,
     /// The node that the tool runs on.
     node: String,
@@ -123,7 +123,7 @@ impl<'a> Observed<'a> {
         Ok(Self { running, tracks, survey, silent })
     }
 
-    fn listing(self, only: Option<Name>) -> Listing {
+    fn listing(self, only: Option<Name>) -> DataListing {
         let (mut items, mut unknown) = (Vec::new(), Vec::new());
         for module in &self.survey.modules {
             let names = [module.name].into_iter().chain(module.aliases.iter().copied());
@@ -141,7 +141,7 @@ impl<'a> Observed<'a> {
         self.add_beyond(only, &mut items, &mut unknown);
         let Self { running, silent, .. } = self;
         let (installation, node) = (running.installation.name.clone(), running.node_name.clone());
-        Listing { installation, node, silent, items, unknown }
+        DataListing { installation, node, silent, items, unknown }
     }
 
     /// Items of modules that the configuration does not have: those at the TCP router, by their own descriptions.
@@ -256,7 +256,7 @@ fn type_name(ty: &Type) -> String {
     }
 }
 
-fn in_text(listing: &Listing, has_types: bool) -> String {
+fn in_text(listing: &DataListing, has_types: bool) -> String {
     let several = listing.items.iter().any(|item| item.node != listing.items[0].node);
     let heads = ["node", "module", "item", "as", ">rate", ">size", ">age", "subscribers", "type"];
     let first = usize::from(!several);
