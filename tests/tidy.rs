@@ -107,7 +107,7 @@ const LONG: &[(&str, usize)] = &[
 ];
 
 /// Words of the book and README together; bars of tables are none. The limit is to fall, to 60 000.
-const WORDS_MAX: usize = 67_000;
+const WORDS_MAX: usize = 66_900;
 
 #[test]
 fn the_book_has_no_more_words_than_a_reader_has_time_for() {

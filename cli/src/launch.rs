@@ -61,6 +61,23 @@ pub(super) struct Arguments {
     /// Launch from a bundle also where its files were changed since it was pushed, or its signature is not trusted.
     #[arg(long)]
     accept_changed_files: bool,
+    /// The node ends when this module has.
+    #[arg(skip)]
+    ends_with: Option<String>,
+}
+
+impl Arguments {
+    /// Whether the module has ended with which all ends.
+    fn is_over(&self, launch: &Launch) -> bool {
+        let is_over = |(name, phase): (&str, Phase)| Some(name) == self.ends_with.as_deref() && phase.is_over();
+        launch.phases().any(is_over)
+    }
+}
+
+/// Runs a configuration that the command has made itself, until its module `ends_with` has ended for good.
+pub(super) fn run_made(file: PathBuf, quiet: bool, ends_with: &str) -> Result<ExitCode, Failure> {
+    let (node, all, impair, log, accept_changed_files) = (None, false, None, None, false);
+    run(&Arguments { file, node, all, impair, quiet, log, accept_changed_files, ends_with: Some(ends_with.into()) })
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -121,7 +138,11 @@ fn launch_once(arguments: &Arguments, bundled: &mut Bundled, speech: &Speech) ->
     let (mut launch, mut view) = begin(arguments, bundled, &mut manager, speech)?;
     bundled.began(speech);
     let (mut shown, mut is_over) = (Ok(()), false);
-    while !is_over && shown.is_ok() && launch.watch(view.wait().min(manager.wait()).min(bundled.wait())) {
+    while !is_over
+        && !arguments.is_over(&launch)
+        && shown.is_ok()
+        && launch.watch(view.wait().min(manager.wait()).min(bundled.wait()))
+    {
         manager.alive(&launch);
         shown = view.show(&mut launch);
         is_over = bundled.look(&launch, speech) && bundled.next().is_some();

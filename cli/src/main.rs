@@ -30,11 +30,11 @@ mod terminal;
 use begin::{arena, check, demo, interface, new};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use computer::{clean, completions, doctor, man, run, version};
-use measure::{bw, delay, graph, hz, mailbox, ping, send, stream};
+use measure::{bw, data, delay, graph, hz, mailbox, ping, send, stream};
 use nodes::{bundle, keys, net, time};
 use running::{call, control, echo, halt, list, log, param, status, top};
 use std::process::ExitCode;
-use team::{entrances, members, path};
+use team::{entrances, members, path, station, two_files};
 use terminal::{complain, habits, parser};
 
 /// Prioritised mailboxes for robots: configure, launch, inspect, call.
@@ -78,6 +78,8 @@ enum Command {
     Status(status::Arguments),
     /// Call a function of a module.
     Call(call::Arguments),
+    /// List all that modules publish: rates, sizes, subscribers.
+    Data(data::Arguments),
     /// Print the data that a module publishes.
     Echo(echo::Arguments),
     /// Print what modules say.
@@ -106,6 +108,10 @@ enum Command {
     Time(time::Arguments),
     /// Show the robot's team: members, leader, views, clocks, intruders.
     Team(members::Arguments),
+    /// Start a robot of a team from the team's two files.
+    Wormhole(two_files::Arguments),
+    /// See a team, make up intruders, ask robots, tell them to end.
+    Station(station::Arguments),
     /// Find the shortest path on a map, around robots.
     Path(path::Arguments),
     /// List the cells from which to block an intruder, nearest first.
@@ -145,7 +151,7 @@ enum Command {
 fn main() -> ExitCode {
     completions::answer(Arguments::command);
     let command = parser::grouped(Arguments::command());
-    let words = parser::options_first(&command, std::env::args_os());
+    let words = parser::options_first(&command, two_files::by_name(std::env::args_os()));
     if let Some(ours) = habits::answer(&words) {
         complain(ours);
         return ExitCode::from(2);
@@ -168,6 +174,7 @@ fn main() -> ExitCode {
         Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),
+        Command::Data(arguments) => data::run(&arguments),
         Command::Echo(arguments) => echo::run(&arguments),
         Command::Log(arguments) => log::run(&arguments),
         Command::Hz(arguments) => hz::run(&arguments),
@@ -182,6 +189,8 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Time(arguments) => time::run(&arguments),
         Command::Team(arguments) => members::run(&arguments),
+        Command::Wormhole(arguments) => two_files::start(&arguments, two_files::TeamProgram::Mobile),
+        Command::Station(arguments) => station::run(&arguments),
         Command::Path(arguments) => path::run(&arguments),
         Command::Entrances(arguments) => entrances::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),

@@ -106,6 +106,7 @@ impl Page<'_> {
         let Installation { name, path, system, time, .. } = self.installation;
         self.line(format!("Installation `{name}` ({})", path.display()));
         self.line("");
+        self.verdict();
         self.entry("system", &format!("{} `{}`: the first byte of its mailbox names", system.id, system.name));
         let time = match time {
             TimeSource::Local => "the computer's clock".into(),

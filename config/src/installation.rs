@@ -2,6 +2,7 @@
 
 use crate::access::{Access, AccessRule};
 use crate::classes::ClassTable;
+use crate::errors::{Errors, Problem};
 use crate::exact::JOURNAL;
 use crate::flow::Flow;
 use crate::gui::Gui;
@@ -12,6 +13,7 @@ use crate::record::{Recording, Sampling};
 use crate::replica::Replica;
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
+use crate::sources::Origins;
 use crate::tcp::Tcp;
 use crate::team::Team;
 use crate::time::{ClockSetPolicy, TimeSource};
@@ -30,8 +32,9 @@ pub struct Installation {
     pub shown: PathBuf,
     /// Folder of the file: relative paths in the file start here.
     pub folder: PathBuf,
-    /// The file's text.
+    /// The file's text; with what it includes and with variables, the text that it resolved to.
     pub text: String,
+    pub(crate) origins: Origins,
     /// The system it describes.
     pub system: System,
     /// The classes.
@@ -177,6 +180,21 @@ impl Installation {
     pub fn replica_port(&self) -> Option<u16> {
         let is_any = self.replicas.iter().any(|replica| self.hop_by_lan(replica).is_some());
         self.network.filter(|_| is_any).map(|network| network.replica_port())
+    }
+
+    /// The file and the line in it that a line of the text comes from.
+    pub fn place(&self, line: usize) -> (PathBuf, usize) {
+        self.origins.place(&self.path, line)
+    }
+
+    /// The files that the file includes.
+    pub fn included(&self) -> impl Iterator<Item = PathBuf> {
+        self.origins.included().map(|file| self.folder.join(file))
+    }
+
+    /// Mistakes in lines of the text, found by others.
+    pub fn errors(&self, problems: Vec<Problem>) -> Errors {
+        Errors::new(&self.path, problems).with_origins(&self.origins)
     }
 
     /// A path of the file as the process sees it: relative ones start from the file's folder.

@@ -30,7 +30,8 @@
 //! ```
 //!
 //! Each section has a file that reads and checks it and words its mistakes (`module`, `classes`, `flow`, `tdma` …);
-//! `errors` prints them, `reader` words wrong types and unknown keys. `config/tests/broken` has an example of each.
+//! `errors` prints them, `sources` joins the files that one includes, `reader` words wrong types and unknown keys.
+//! `config/tests/broken` has an example of each.
 //!
 //! Every key of the file is described in `docs/src/configuration.md`.
 #![forbid(unsafe_code)]
@@ -73,6 +74,7 @@ mod restart;
 mod saved;
 mod scheduling;
 mod settings;
+mod sources;
 mod standby;
 mod stopping;
 mod stream;
@@ -111,10 +113,11 @@ pub use rohrpost_mailbox::OverflowPolicy;
 pub use saved::{Saved, SavedDocument, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::Document;
+pub use sources::resolved_text;
 pub use standby::{HOLDERS_FILE, LeaseTimes, MOVING_MODULES_MAX, holder_line, holders};
 pub use stream::{RECORD_BYTES_MAX, StreamSpec};
 pub use tcp::{TCP_SERVER, Tcp};
-pub use team::{TEAM_PEERS_MAX, Team, TeamPeer, TeamReach, hosts};
+pub use team::{RosterMistake, TEAM_PEERS_MAX, Team, TeamHost, TeamPeer, TeamReach, hosts, roster};
 pub use time::{ClockSetPolicy, TimeSource};
 pub use units::{
     UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,

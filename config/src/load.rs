@@ -4,7 +4,7 @@ use crate::access::Access;
 use crate::check;
 use crate::classes::ClassTable;
 use crate::directory::Directory;
-use crate::errors::{Errors, Problem};
+use crate::errors::Errors;
 use crate::flow::Flow;
 use crate::gui::Gui;
 use crate::installation::Installation;
@@ -17,6 +17,7 @@ use crate::record::{self, Recording};
 use crate::replica::Replica;
 use crate::saved::Saved;
 use crate::scheduling::SchedulingRule;
+use crate::sources::{Origins, resolved_text};
 use crate::tcp::{self, Tcp};
 use crate::tdma;
 use crate::team::{self, Team};
@@ -26,13 +27,9 @@ use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
 impl Installation {
-    /// Reads and checks a file, the parameters saved beside it, and the hosts of its team.
+    /// Reads and checks a file with all that it includes, the parameters saved beside it, and the hosts of its team.
     pub fn load(path: &Path) -> Result<Self, Errors> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            let message = format!("cannot be read ({error}); name an installation's file, such as config/demo.toml");
-            Errors::new(path, vec![Problem { line: None, message }])
-        })?;
-        let mut installation = Self::parse(&text, path)?;
+        let mut installation = Self::parse(&resolved_text(path)?, path)?;
         if let Some(file) = &installation.parameters {
             installation.saved = Some(Saved::load(file, &installation)?);
         }
@@ -42,8 +39,8 @@ impl Installation {
         Ok(installation)
     }
 
-    /// Checks the text of a file; `path` is its name in messages and the place that relative paths start from. Saved
-    /// parameters and files of hosts are not read.
+    /// Checks the text of one file, or what [`resolved_text`] made of several; `path` is its name in messages and the
+    /// place that relative paths start from. Saved parameters and files of hosts are not read.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Errors> {
         let reader = Reader::new(text);
         let (document, syntax) = DeTable::parse_recoverable(text);
@@ -55,7 +52,7 @@ impl Installation {
         let problems = reader.into_problems();
         match read {
             Some(installation) if problems.is_empty() => Ok(installation),
-            _ => Err(Errors::new(path, problems)),
+            _ => Err(Errors::new(path, problems).with_origins(&Origins::of(text))),
         }
     }
 }
@@ -66,6 +63,9 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
         _ => PathBuf::from("."),
     };
+    if let Some(item) = file.get("include") {
+        item.report("`include` names other files, and this is a text without them; read it from its file");
+    }
     let name = file.required("installation", "installation = \"demo\"").and_then(|item| item.word("demo"));
     let parameters = file.get("parameters").and_then(|item| item.text("tuned.toml")).map(|path| folder.join(path));
     let system = System::read(required(&file, "system", "`[system]` with `name = \"robot\"` and `id = 1`"));
@@ -127,6 +127,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         shown: path.clone(),
         path,
         folder,
+        origins: Origins::of(&text),
         text,
         system,
         classes,

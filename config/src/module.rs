@@ -25,8 +25,10 @@ pub const RECORDER: &str = "logd";
 /// The built-in module that plays recordings.
 pub const REPLAY: &str = "replay";
 /// The modules that the `rohrpost` program itself contains.
-pub const BUILTINS: [&str; 10] =
-    ["sim", "carmen", "mapper", "pilot", "mischief", "wormhole", "team", "output", RECORDER, REPLAY];
+pub const BUILTINS: [&str; 14] = [
+    "sim", "carmen", "mapper", "pilot", "mischief", "wormhole", "team", "payload", "station", "arena", "body",
+    "output", RECORDER, REPLAY,
+];
 
 /// What runs as a module.
 #[derive(Clone, Debug, PartialEq, Eq)]

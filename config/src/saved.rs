@@ -174,9 +174,11 @@ impl<'s> SavedDocument<'s> {
     }
 
     pub(crate) fn wrong(&self, module: Name, at: usize, message: &str) -> SettingsError {
+        let line = self.lines.line(at);
         SettingsError {
             path: self.saved.path.clone(),
-            line: self.lines.line(at),
+            line,
+            text_line: line,
             module: self.installation.classes.format(module),
             message: message.into(),
         }

@@ -62,11 +62,11 @@ impl<'i> Document<'i> {
     pub fn settings_without_saved<T: DeserializeOwned>(&self, module: &Module) -> Result<T, SettingsError> {
         let settings = self.settings(module);
         let place = settings.span();
-        T::deserialize(ValueDeserializer::from(settings)).map_err(|error| SettingsError {
-            path: self.installation.path.clone(),
-            line: self.lines.line(error.span().unwrap_or(place).start),
-            module: self.installation.classes.format(module.name),
-            message: error.message().into(),
+        T::deserialize(ValueDeserializer::from(settings)).map_err(|error| {
+            let text_line = self.lines.line(error.span().unwrap_or(place).start);
+            let (path, line) = self.installation.place(text_line);
+            let module = self.installation.classes.format(module.name);
+            SettingsError { path, line, text_line, module, message: error.message().into() }
         })
     }
 

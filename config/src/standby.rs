@@ -41,6 +41,17 @@ pub struct LeaseTimes {
     pub off: Duration,
 }
 
+impl LeaseTimes {
+    /// Times of the leases in time slots with such a cycle, counted in cycles; none: without time slots.
+    pub fn of(cycle: Option<Duration>) -> Self {
+        let Some(cycle) = cycle else {
+            return Self { lease: ASK_EVERY * ASKS, ask_every: ASK_EVERY, off: OFF };
+        };
+        let (ask_every, off) = (cycle * ASK_EVERY_CYCLES, OFF.min(cycle * OFF_CYCLES));
+        Self { lease: ask_every * ASKS + off, ask_every, off }
+    }
+}
+
 /// A line of [`HOLDERS_FILE`]: a name as a number, and the place of its node on the LAN.
 pub fn holder_line(name: Name, node: u8) -> String {
     format!("{} {node}\n", name.raw())
@@ -109,13 +120,9 @@ impl Installation {
         module.witness.as_deref().or_else(|| of(&is_wormhole)).or_else(|| of(&is_motor))
     }
 
-    /// Times of the leases: in time slots they are counted in cycles.
+    /// Times of the leases.
     pub fn lease_times(&self) -> LeaseTimes {
-        let Some(cycle) = self.tdma.as_ref().map(|tdma| tdma.cycle) else {
-            return LeaseTimes { lease: ASK_EVERY * ASKS, ask_every: ASK_EVERY, off: OFF };
-        };
-        let (ask_every, off) = (cycle * ASK_EVERY_CYCLES, OFF.min(cycle * OFF_CYCLES));
-        LeaseTimes { lease: ask_every * ASKS + off, ask_every, off }
+        LeaseTimes::of(self.tdma.as_ref().map(|tdma| tdma.cycle))
     }
 
     /// The modules for which a node stands by.

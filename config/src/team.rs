@@ -4,8 +4,10 @@
 //! `team-router.0` on the first node of the file, `team-router.1` on the second, and so on.
 
 mod hosts;
+mod roster;
 
 pub use hosts::{TEAM_PEERS_MAX, TeamPeer, hosts};
+pub use roster::{RosterMistake, TeamHost, roster};
 
 use crate::classes::{ClassTable, TEAM_ROUTER};
 use crate::errors::Errors;
@@ -151,6 +153,8 @@ impl Team {
                 None
             }
         };
+        // For `rohrpost team launch` alone, which reads it.
+        section.get("launch");
         section.finish();
         let reach = reach.unwrap_or(TeamReach::Group(Ipv4Addr::UNSPECIFIED));
         Self { reach, keys, port, addresses }

@@ -1,4 +1,4 @@
-//! The layout that a viewer opens with: without sensors that give pictures or points, and with them.
+//! The layout that a viewer opens with: without sensors that give pictures or points, with them, and of a team.
 //!
 //! ```text
 //!   ┌──────────────────────────┬───────────────┐
@@ -20,6 +20,15 @@
 //!   ├───────────────┬──────┴┬────────┴─────────┤
 //!   │ Modules       │ now   │ Output           │
 //!   └───────────────┴───────┴──────────────────┘
+//!
+//!   ┌──────────────────────────┬───────────────┐
+//!   │ Team │ World │ tabs of   │ Modes         │
+//!   │      │       │ views,    ├───────────────┤
+//!   │                 Traffic  │ Groups        │
+//!   ├──────────────────────────┤               │
+//!   │ Output │ Modules │ now   ├───────────────┤
+//!   │                          │ Key           │
+//!   └──────────────────────────┴───────────────┘
 //! ```
 
 use crate::palette;
@@ -55,7 +64,17 @@ const CELLS_MAX: usize = 3;
 pub struct Tab {
     name: String,
     panel: Panel,
-    is_beside: bool,
+    place: TabPlace,
+}
+
+/// Where a tab is.
+#[derive(Clone, Copy, PartialEq)]
+enum TabPlace {
+    /// In the place of the world, and before it.
+    First,
+    /// In the place of the world.
+    World,
+    Beside,
 }
 
 #[derive(Clone)]
@@ -64,6 +83,8 @@ enum Panel {
     Space {
         origin: EntityPath,
         contents: Vec<String>,
+        /// Where the eye is, and what it looks at; none: as the viewer thinks best.
+        eye_m: Option<[[f32; 3]; 2]>,
     },
     Curves(String),
     CurvesAndLines(String),
@@ -74,7 +95,7 @@ enum Panel {
 
 impl Tab {
     fn new(name: &str, panel: Panel) -> Self {
-        Self { name: name.into(), panel, is_beside: false }
+        Self { name: name.into(), panel, place: TabPlace::World }
     }
 
     /// The world from above, with these entities only, such as `/world/scan/**`.
@@ -86,7 +107,15 @@ impl Tab {
     /// up.
     pub fn space(name: &str, origin: impl Into<EntityPath>, contents: &[&str]) -> Self {
         let contents = contents.iter().map(|entity| (*entity).into()).collect();
-        Self::new(name, Panel::Space { origin: origin.into(), contents })
+        Self::new(name, Panel::Space { origin: origin.into(), contents, eye_m: Some([EYE_M, EYE_TARGET_M]) })
+    }
+
+    /// All below an entity in space, seen from this place to that one. With it there is room for timelines beside the
+    /// world, and charts are a tab.
+    pub(crate) fn floor(name: &str, origin: &str, eye_m: Option<[[f32; 3]; 2]>) -> Self {
+        let contents = vec![format!("{origin}/**")];
+        let panel = Panel::Space { origin: origin.into(), contents, eye_m };
+        Self { place: TabPlace::First, ..Self::new(name, panel) }
     }
 
     /// Curves of all numbers below an entity.
@@ -114,7 +143,7 @@ impl Tab {
     /// uppermost cell, as its tabs.
     #[must_use]
     pub fn beside(self) -> Self {
-        Self { is_beside: true, ..self }
+        Self { place: TabPlace::Beside, ..self }
     }
 }
 
@@ -166,10 +195,20 @@ impl Draft {
         self.property(view, "Background", ground())
     }
 
-    fn space(&mut self, name: &str, origin: &EntityPath, contents: &[String]) -> ContainerLike {
+    fn space(
+        &mut self,
+        name: &str,
+        origin: &EntityPath,
+        contents: &[String],
+        eye_m: Option<[[f32; 3]; 2]>,
+    ) -> ContainerLike {
         let view = Spatial3DView::new(name).with_origin(origin.clone());
         let view = view.with_contents(contents.iter().map(String::as_str));
-        let eye = EyeControls3D::new().with_position(EYE_M).with_look_target(EYE_TARGET_M).with_eye_up([0.0, 0.0, 1.0]);
+        let up = EyeControls3D::new().with_eye_up([0.0, 0.0, 1.0]);
+        let eye = match eye_m {
+            Some([place, target]) => up.with_position(place).with_look_target(target),
+            None => up,
+        };
         let view = self.property(view, "Background", ground());
         let view = self.property(view, "EyeControls3D", eye);
         // Its plane would be at the sensor's height, which is no floor.
@@ -197,7 +236,7 @@ impl Draft {
     fn panel(&mut self, name: &str, panel: &Panel) -> ContainerLike {
         match panel {
             Panel::Plane(contents) => self.plane(name, contents),
-            Panel::Space { origin, contents } => self.space(name, origin, contents),
+            Panel::Space { origin, contents, eye_m } => self.space(name, origin, contents, *eye_m),
             Panel::Curves(origin) => self.chart(name, origin, true),
             Panel::CurvesAndLines(origin) => Vertical::new([
                 self.chart(&format!("{name}: numbers"), origin, true),
@@ -237,12 +276,23 @@ impl Draft {
     }
 
     fn with_sensors(&mut self, world: Tabs, beside: &[&Tab]) -> Vertical {
-        let charts = Vertical::new(self.charts()).with_row_shares([4.0, 5.0, 3.0]);
-        let upper = Horizontal::new([world.into(), self.column(beside).into(), charts.into()])
+        let upper = Horizontal::new([world.into(), self.column(beside).into(), self.traffic().into()])
             .with_column_shares([5.0, 3.0, 3.0]);
         let [all, now] = states();
         let lower = Horizontal::new([all, now, self.lines("Output", "output")]).with_column_shares([4.0, 2.0, 5.0]);
         Vertical::new([upper.into(), lower.into()]).with_row_shares([7.0, 3.0])
+    }
+
+    fn with_team(&mut self, mut world: Vec<ContainerLike>, beside: &[&Tab]) -> Horizontal {
+        world.push(self.traffic().with_name("Traffic").into());
+        let [all, now] = states();
+        let below = Tabs::new([self.lines("Output", "output"), all, now]);
+        let left = Vertical::new([Tabs::new(world).into(), below.into()]).with_row_shares([4.0, 1.0]);
+        Horizontal::new([left.into(), self.column(beside).into()]).with_column_shares([7.0, 4.0])
+    }
+
+    fn traffic(&mut self) -> Vertical {
+        Vertical::new(self.charts()).with_row_shares([4.0, 5.0, 3.0])
     }
 
     fn column(&mut self, beside: &[&Tab]) -> Vertical {
@@ -253,13 +303,16 @@ impl Draft {
     }
 
     fn all(&mut self, layout: &Layout) -> Blueprint {
-        let (beside, others): (Vec<&Tab>, Vec<&Tab>) = layout.tabs.iter().partition(|tab| tab.is_beside);
-        let mut world = vec![self.plane("World", &["/world/**".into()])];
-        world.extend(self.tabs(others));
-        let world = Tabs::new(world);
+        let of = |place: TabPlace| layout.tabs.iter().filter(move |tab| tab.place == place);
+        let mut world = self.tabs(of(TabPlace::First));
+        let has_team = !world.is_empty();
+        world.push(self.plane("World", &["/world/**".into()]));
+        world.extend(self.tabs(of(TabPlace::World)));
+        let beside: Vec<&Tab> = of(TabPlace::Beside).collect();
         let root: ContainerLike = match &beside[..] {
-            [] => self.without_sensors(world).into(),
-            beside => self.with_sensors(world, beside).into(),
+            beside if has_team => self.with_team(world, beside).into(),
+            [] => self.without_sensors(Tabs::new(world)).into(),
+            beside => self.with_sensors(Tabs::new(world), beside).into(),
         };
         Blueprint::new(root)
             .with_auto_views(false)

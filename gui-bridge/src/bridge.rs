@@ -9,6 +9,7 @@ use crate::sink::CloseError;
 use crate::store::DrawingCounts;
 use crate::subjects::{Intake, NEWEST, Subjects};
 use crate::supervisor::{self, StreamSupervisor, Turn};
+use crate::team::Floor;
 use crate::view::Views;
 use crate::{RATE_HZ, RATE_HZ_MIN, Scene, Sink, scene, views};
 use rohrpost::interface::{Interface, Proxy};
@@ -25,7 +26,7 @@ use std::time::{Duration, Instant};
 
 /// States and charts are drawn so often.
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
-/// What comes of other nodes, page by page, is taken so often; large streams are looked at no more often.
+/// What comes of other nodes and systems, page by page, is taken so often; large streams are looked at no more often.
 const COLLECT_PERIOD: Duration = Duration::from_millis(25);
 /// Data with a newest value that may wait while the bridge is stopped. Of more data, the least important are lost.
 const NEWEST_SLOTS: u16 = 64;
@@ -50,6 +51,10 @@ pub struct Settings {
     /// No entity is drawn more often; [`RATE_HZ_MIN`] to 1000, or 0, which is no limit.
     #[serde(default = "rate_hz")]
     rate_hz: f64,
+    /// The map that the robots of a team share, from the configuration file's folder.
+    map: Option<PathBuf>,
+    /// Side of the map's cells, metres, if the map does not say it.
+    cell_m: Option<f64>,
 }
 
 fn file_max_mib() -> u64 {
@@ -98,7 +103,7 @@ impl<V: Views> Module for Bridge<V> {
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         let installation = context.installation();
-        let Settings { file, file_max_mib, viewer, rate_hz } = settings;
+        let Settings { file, file_max_mib, viewer, rate_hz, map, cell_m } = settings;
         let sink = match (viewer, file) {
             (Some(viewer), _) if viewer == "window" => Sink::Window,
             (Some(address), _) => Sink::Viewer(address),
@@ -115,17 +120,21 @@ impl<V: Views> Module for Bridge<V> {
             let text = format!("`file-max-mib` is {file_max_mib}; use {FILE_MIB_MIN} or more");
             return Err(ModuleError::new(text));
         }
+        let floor = map.map(|map| Floor::read(&installation.resolve(&map), cell_m)).transpose();
+        let floor = floor.map_err(|why| ModuleError::new(format!("`map`: {why}")))?;
         let me = installation.module(context.me()).ok_or_else(|| ModuleError::new("it is not in the configuration"))?;
         let node_name = me.node.clone();
         let newest = newest(&me.mailboxes.data);
         let node = context.link().borrow().participant().node().clone();
         let intake = Intake { body_bytes_max: newest.body_bytes_max.into(), period: scene::period(rate_hz) };
         context.open_mailbox(NEWEST, newest)?;
-        let subjects = Subjects::new(V::make(), context, intake);
+        let subjects = Subjects::new(V::make(), floor, context, intake);
         let nodes = Nodes::new(node.clone(), &node_name, context.installation());
         // People look at it also while the robot's time stands still.
         context.use_computer_clock();
-        context.set_period(if nodes.are_several() { COLLECT_PERIOD } else { SURVEY_PERIOD });
+        let installation = context.installation();
+        let are_of_others = installation.gui.show.iter().any(|show| show.from.system() != installation.system.id);
+        context.set_period(if nodes.are_several() || are_of_others { COLLECT_PERIOD } else { SURVEY_PERIOD });
         Ok(Self {
             sink,
             rate_hz,
@@ -239,8 +248,12 @@ impl<V> Bridge<V> {
     /// Looks for what has begun to run since the last time.
     fn find(&mut self, context: &mut Context, survey: &Survey) -> Result<(), ModuleError> {
         let collector = context.installation().classes.id(CollectorInterface::CLASS);
-        // One that starts or hangs would be waited for in vain.
+        let system = context.installation().system.id;
+        // One that starts or hangs would be waited for in vain. What runs in another system is not known here.
         let runs = |name: Name| {
+            if name.system() != system {
+                return true;
+            }
             let process = survey.module(name).and_then(|module| module.process.as_ref());
             process.is_some_and(|process| matches!(process.state, Some(ModuleState::On | ModuleState::Off)))
         };

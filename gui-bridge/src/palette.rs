@@ -19,6 +19,30 @@ pub(crate) const AID: Rgb = [104, 112, 126];
 pub(crate) const FREE: Rgb = [226, 228, 224];
 /// See [`FREE`].
 pub(crate) const OCCUPIED: Rgb = [16, 22, 34];
+/// A wall in space, and a path between walls.
+pub(crate) const WALL: Rgb = [92, 100, 114];
+/// See [`WALL`].
+pub(crate) const PATH: Rgb = [58, 64, 75];
+/// Modes of a robot of a team, and that it knows no place.
+pub(crate) const WANDERING: Rgb = [235, 236, 232];
+/// See [`WANDERING`].
+pub(crate) const SEARCHING: Rgb = [255, 220, 60];
+/// See [`WANDERING`].
+pub(crate) const BLOCKING: Rgb = [255, 45, 45];
+/// See [`WANDERING`].
+pub(crate) const LOST: Rgb = [200, 80, 255];
+/// What is around a robot that its program does not drive, and its heading.
+pub(crate) const NOT_ITS_PROGRAM: Rgb = [250, 250, 250];
+/// See [`NOT_ITS_PROGRAM`].
+pub(crate) const HEADING: Rgb = [250, 250, 250];
+/// What is above the leader of a group.
+pub(crate) const LEADER: Rgb = [255, 205, 0];
+/// An intruder's body, and one that a station made up.
+pub(crate) const INTRUDER: Rgb = [150, 20, 40];
+/// See [`INTRUDER`].
+pub(crate) const FAKE: Rgb = [255, 130, 230];
+/// A touch.
+pub(crate) const TOUCH: Rgb = [255, 0, 0];
 
 /// Okabe and Ito's eight without black: one for each class, in the order in which classes come.
 const SERIES: [Rgb; 8] = [

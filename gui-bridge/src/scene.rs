@@ -2,11 +2,14 @@
 
 use crate::blueprint::Layout;
 use crate::sink::{CloseError, OpenError, Sink};
-use crate::state::{Charts, ModuleStates, Texts, World};
+use crate::state::{Charts, Lane, ModuleStates, Texts, World};
 use crate::store::{DrawingCounts, Row, Store};
 use crate::supervisor::{self, StreamSupervisor, Turn};
+use crate::team::known::TeamWorld;
+use crate::team::look::Look;
 use crate::timelines::{ROBOT_TIME, SYSTEM_TIME};
 use rerun::{ApplicationId, AsComponents, EntityPath, EntityPathPart, TimeCell, TimePoint};
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -66,6 +69,10 @@ pub struct Scene {
     pub(crate) states: ModuleStates,
     pub(crate) charts: Charts,
     pub(crate) texts: Texts,
+    pub(crate) team: TeamWorld,
+    /// Robots of a team as they are drawn.
+    pub(crate) looks: HashMap<u8, Look>,
+    pub(crate) lanes: HashMap<EntityPath, Lane>,
 }
 
 impl Scene {
@@ -108,6 +115,9 @@ impl Scene {
             states: ModuleStates::default(),
             charts: Charts::default(),
             texts: Texts::default(),
+            team: TeamWorld::default(),
+            looks: HashMap::new(),
+            lanes: HashMap::new(),
         };
         scene.set_time(system_time_ns);
         scene.arrange(Layout::default());

@@ -1,5 +1,6 @@
 //! What a scene remembers between two calls: of the world, the modules' states, the charts and the texts.
 
+use crate::palette::Rgb;
 use crate::trajectory::Trajectory;
 use crate::world::extent::Extent;
 use rerun::EntityPath;
@@ -58,4 +59,12 @@ pub(crate) struct ChartClass {
 #[derive(Default)]
 pub(crate) struct Texts {
     pub(crate) last: HashMap<EntityPath, String>,
+}
+
+/// What a timeline of one robot has shown so far.
+#[derive(Default)]
+pub(crate) struct Lane {
+    pub(crate) last: String,
+    /// States that have a colour of their own.
+    pub(crate) states: Vec<(String, Rgb)>,
 }

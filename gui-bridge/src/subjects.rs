@@ -2,6 +2,7 @@
 
 use crate::blueprint::Layout;
 use crate::ring::Ring;
+use crate::team::Floor;
 use crate::view::{Datum, View, Wish};
 use crate::{Scene, replicas, views};
 use rerun::EntityPath;
@@ -90,7 +91,7 @@ pub(crate) struct Subjects {
 
 impl Subjects {
     /// What the configuration wants to be shown, and what modules say. `own` views are asked before those built in.
-    pub(crate) fn new(own: Vec<Box<dyn View>>, context: &Context, intake: Intake) -> Self {
+    pub(crate) fn new(own: Vec<Box<dyn View>>, floor: Option<Floor>, context: &Context, intake: Intake) -> Self {
         let installation = context.installation();
         let text = |name| installation.classes.format(name);
         let entry = |show: &Show| Entry {
@@ -136,7 +137,7 @@ impl Subjects {
             let (module, data) = (text(client), Some("link".into()));
             entries.push(Entry { from: client, module, data, rate: None, answered: false, asking: None, heard: None });
         }
-        let views = own.into_iter().chain(views::built_in()).collect();
+        let views = own.into_iter().chain(views::built_in(floor)).collect();
         Self { views, entries, subjects: Vec::new(), intake }
     }
 
@@ -233,7 +234,10 @@ impl Subjects {
         let Subject { from, module, item, view, .. } = subject;
         let installation = context.installation();
         let datum = Datum { from: *from, module, item, installation, bytes: data.value };
-        draw(self.views[*view].as_mut(), scene, data.head.stamp_ns, &datum);
+        // Another system's time may be any.
+        let is_own = from.system() == installation.system.id;
+        let at_ns = if is_own { data.head.stamp_ns } else { context.now().ns };
+        draw(self.views[*view].as_mut(), scene, at_ns, &datum);
     }
 
     /// Whether there are streams to look at.

@@ -11,16 +11,16 @@ use crate::scene::Scene;
 use crate::slots::{Flows, Slots};
 use crate::states::Level;
 use crate::tcp_links::TcpLinks;
-use crate::team::Teams;
+use crate::team::{Floor, Incidents, Teams};
 use crate::view::{Datum, View, Wish, is};
 use rohrpost::interface::Interface;
-use rohrpost::interfaces::CartographerInterface;
+use rohrpost::interfaces::{CartographerInterface, ControlState};
 use rohrpost::output::OutputLine;
 use rohrpost::schema::{DataItem, Description};
 use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose};
 
-/// All of them; the last wants everything.
-pub(crate) fn built_in() -> Vec<Box<dyn View>> {
+/// All of them; the last wants everything. The floor is that of a team.
+pub(crate) fn built_in(floor: Option<Floor>) -> Vec<Box<dyn View>> {
     vec![
         Box::new(Laser),
         Box::new(Wheels),
@@ -28,7 +28,9 @@ pub(crate) fn built_in() -> Vec<Box<dyn View>> {
         Box::new(Localisation),
         Box::new(Pictures),
         Box::new(Clouds),
-        Box::new(Teams),
+        Box::new(Teams::on(floor)),
+        Box::new(Incidents),
+        Box::new(Drivers),
         Box::new(Output),
         // Before the network: of both tabs the first is there.
         Box::new(Replicas::default()),
@@ -148,6 +150,24 @@ pub(crate) fn draw_line(scene: &mut Scene, installation: &rohrpost_config::Insta
     scene.set_time(line.time_ns);
     let module = installation.classes.format(line.module());
     scene.output_line(&module, Level::from(line.level), &line.full_text());
+}
+
+/// Which program drives: as other data, and at the robot if it is one of a team.
+struct Drivers;
+
+impl View for Drivers {
+    fn wants(&self, _: &Description, item: &DataItem) -> bool {
+        is::<ControlState>(item)
+    }
+
+    fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
+        scene.control(datum.from.system(), datum.read()?);
+        OtherData.draw(scene, datum)
+    }
+
+    fn tabs(&self) -> Vec<Tab> {
+        OtherData.tabs()
+    }
 }
 
 /// Everything else: numbers as curves, the rest as text.

@@ -1,15 +1,26 @@
 //! Interfaces behind which hardware, simulation and logs are interchangeable (seed 002, 5.2), and those of the built-in
 //! modules.
 
+mod arena;
+mod payload;
 mod recorder;
 mod replay;
 mod router;
 mod slots;
+mod station;
 mod tcp;
 mod team;
 mod team_router;
 mod wormhole;
 
+pub use arena::{
+    Arena, ArenaConduct, ArenaCounts, ArenaIncident, ArenaInterface, ArenaIntruder, ArenaMishap, ArenaProxy,
+    ArenaRefusal, ArenaRobot, ArenaState,
+};
+pub use payload::{
+    Payload, PayloadBeats, PayloadExit, PayloadIdle, PayloadInterface, PayloadMode, PayloadProxy, PayloadState,
+    TeamCell, TeamPlace,
+};
 pub use recorder::{ChannelPage, LostBy, RecordedMessages, Recorder, RecorderInterface, RecorderProxy, RecordingState};
 pub use replay::{Replay, ReplayInterface, ReplayPosition, ReplayProxy, ReplayRefusal};
 pub use router::{
@@ -18,6 +29,10 @@ pub use router::{
     RouterInterface, RouterProxy, SocketFailure,
 };
 pub use slots::{SlotState, SlotUse, TunnelState};
+pub use station::{
+    Station, StationAnswer, StationInterface, StationMessage, StationProxy, StationRequest, StationRequestKind,
+    StationRobot, StationState,
+};
 
 pub use tcp::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondLink, BeyondNode, BeyondOutage,

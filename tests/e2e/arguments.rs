@@ -45,7 +45,7 @@ fn numbers_below_zero_and_texts_that_begin_as_json_are_values() {
 fn a_command_of_ros_2_is_answered_by_ours() {
     let place = Place::new();
     for (words, ours) in [
-        (&["topic", "list"][..], "here it is: rohrpost graph"),
+        (&["topic", "list"][..], "here it is: rohrpost data"),
         (&["topic", "echo", "/scan", "--once"], "here it is: rohrpost echo MODULE [DATA]"),
         (&["service", "call", "/drive"], "here it is: rohrpost call MODULE FUNCTION"),
         (&["bag"], "\n  bag record rohrpost record on\n"),

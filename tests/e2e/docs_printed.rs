@@ -17,7 +17,7 @@ pub(crate) enum Compared {
 use Compared::{Header, Whole};
 
 /// Commands of `docs/src/tools.md`, in the order in which they are run.
-const TOOLS: [(&str, Compared); 43] = [
+const TOOLS: [(&str, Compared); 44] = [
     ("log", Whole),
     ("log --text MAP --last 1", Whole),
     ("list -m", Whole),
@@ -25,6 +25,7 @@ const TOOLS: [(&str, Compared); 43] = [
     ("call odometry.0 get odometry", Whole),
     ("call motor.0 drive 0.1", Whole),
     ("call motor.0 drive NaN 0", Whole),
+    ("data", Whole),
     ("echo odometry.0 -c 2", Whole),
     ("echo laser.0 --rate 1 -c 1", Whole),
     ("hz odometry.0 --count 2", Whole),

@@ -151,7 +151,7 @@ pub(crate) fn assert_plain(what: &[&str], text: &str) {
 }
 
 /// Subcommands that print nothing that a module, a node or an outside program wrote.
-const OWN_WORDS: [&str; 25] = [
+const OWN_WORDS: [&str; 27] = [
     "check",
     "launch",
     "demo",
@@ -175,7 +175,9 @@ const OWN_WORDS: [&str; 25] = [
     // Of supervisors, with words as plain lines; of files.
     "halt",
     "resume",
+    "station",
     "arena",
+    "wormhole",
     "bundle",
     "path",
     "entrances",
@@ -253,6 +255,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["hz", "probe.0", "missing"],
         &["bw", "probe.0", "--seconds", "0.3"],
         &["delay", "probe.0", "--seconds", "0.3"],
+        &["data", "--seconds", "0.3", "--types"],
         &["graph", "--seconds", "0.3"],
         &["graph", "--seconds", "0.3", "--silent", "--all"],
         &["graph", "--seconds", "0.3", "--silent", "--all", "--dot"],
@@ -285,6 +288,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["echo", "probe.0", HOSTILE, "-c", "1", "--json"],
         &["log", "--json"],
         &["hz", "probe.0", "--seconds", "0.3", "--json"],
+        &["data", "--seconds", "0.3", "--json"],
         &["graph", "--seconds", "0.3", "--silent", "--json"],
         &["list", "--json"],
         &["top", "--once", "--json"],

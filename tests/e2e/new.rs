@@ -1,6 +1,7 @@
 //! `rohrpost new`: its project is built, tested, launched and called, as its README says.
 
-use crate::harness::{Place, until, wait};
+use crate::harness::{Place, python, until, wait};
+use crate::python_node::package;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -131,4 +132,22 @@ fn nothing_that_is_there_is_written_over() {
     assert!(!place.path("here").exists());
     place.say(&["new", "arm", "--path", "deep/er", "--rohrpost", ROOT]).ok();
     assert!(place.path("deep/er/src/lib.rs").exists());
+}
+
+#[test]
+fn a_new_project_in_python_runs_and_has_a_test_that_passes() {
+    let place = Place::new();
+    place.say(&["new", "wind-vane", "--python"]).ok_with(["  cd wind-vane\n  rohrpost launch robot.toml\n"]);
+    let package = package(&place);
+    let programs = Path::new(env!("CARGO_BIN_EXE_rohrpost")).parent().unwrap().to_owned();
+    let path =
+        std::env::join_paths([programs].into_iter().chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())));
+    let mut tests = python(&place, &["-m", "unittest"]);
+    tests.current_dir(place.path("wind-vane")).env("PYTHONPATH", package).env("PATH", path.unwrap());
+    tests.env("PYTHONDONTWRITEBYTECODE", "1");
+    let tested = tests.output().unwrap();
+    assert!(tested.status.success(), "{tested:?}");
+    assert!(String::from_utf8_lossy(&tested.stderr).contains("Ran 1 test"), "{tested:?}");
+    place.say(&["new", "eye", "--python", "--camera"]);
+    assert!(!place.path("eye").exists());
 }

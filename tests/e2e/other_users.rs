@@ -30,7 +30,7 @@ fn a_node_of_another_user_is_told_and_not_obeyed() {
 #[test]
 fn a_pipe_among_the_files_of_a_node_keeps_no_tool_waiting() {
     let (place, mut launch, robot) = Place::running(&[OUTPUT]);
-    let config = robot.node.path().join(rohrpost_launch::CONFIG_FILE);
+    let config = robot.node.path().join(rohrpost_modules::runtime::CONFIG_FILE);
     let put_pipe = |name: &str| {
         let path = robot.node.path().join(name);
         fs::remove_file(&path).unwrap();
@@ -39,7 +39,7 @@ fn a_pipe_among_the_files_of_a_node_keeps_no_tool_waiting() {
     put_pipe("children");
     place.say(&["list"]).ok();
     let noted = fs::read(&config).unwrap();
-    put_pipe(rohrpost_launch::CONFIG_FILE);
+    put_pipe(rohrpost_modules::runtime::CONFIG_FILE);
     place.say(&["list"]).fails_with(["it is a named pipe, not a file"]);
     fs::remove_file(&config).unwrap();
     fs::write(&config, noted).unwrap();

@@ -2,6 +2,7 @@
 
 mod intruders;
 mod stranger;
+mod two_files;
 
 use crate::exact::replayed;
 use crate::harness::{Place, assert_has, head, lab, times, until};

@@ -22,7 +22,7 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
     let after: &[&str] = match command {
         "list" | "status" | "log" => &[],
         "top" => &["--once", "--interval", "0.1"],
-        "graph" => &["--seconds", "0.1"],
+        "graph" | "data" => &["--seconds", "0.1"],
         "call" | "mailbox" | "hz" | "bw" | "delay" | "ping" | "restart" | "stop" | "start" => &["probe.0"],
         "echo" => &["probe.0", "beat"],
         "send" => &["probe.0", "count", "1", "--count", "1"],
@@ -209,12 +209,16 @@ fn tools_say_what_to_do_while_nothing_runs() {
     let said = place.say(&["run", "mop", "--config", config.to_str().unwrap(), "--name", "output.0"]);
     assert_eq!(said.code, Some(2), "{said:?}");
     assert!(
-        said.err.contains("'mop'") && said.err.contains("sim, carmen, mapper, pilot, mischief, wormhole, team, output"),
+        said.err.contains("'mop'")
+            && said.err.contains("sim, carmen, mapper, pilot, mischief, wormhole, team, payload, arena, body, output"),
         "{said:?}"
     );
     let help = place.say(&["run", "--help"]).ok();
     let words: Vec<&str> = help.split_whitespace().collect();
-    assert!(words.join(" ").contains("sim, carmen, mapper, pilot, mischief, wormhole, team, output"), "{help}");
+    assert!(
+        words.join(" ").contains("sim, carmen, mapper, pilot, mischief, wormhole, team, payload, arena, body, output"),
+        "{help}"
+    );
     place.assert_empty();
 }
 

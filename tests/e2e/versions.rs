@@ -63,7 +63,7 @@ fn a_mailbox_of_another_version_is_told_from_a_broken_one() {
 #[test]
 fn what_launch_of_another_version_noted_is_not_guessed_at() {
     let (place, mut launch, robot) = Place::running(&[OUTPUT, &probe("probe.0", "", "")]);
-    let noted = robot.node.path().join(rohrpost_launch::CONFIG_FILE);
+    let noted = robot.node.path().join(rohrpost_modules::runtime::CONFIG_FILE);
     let text = std::fs::read_to_string(&noted).unwrap();
     std::fs::write(&noted, "{ \"something\": \"else\" }").unwrap();
     place.say(&["list"]).fails_with(["was written by another version of launch; say --config FILE"]);

@@ -9,6 +9,8 @@ use tempfile::TempDir;
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/robot/tests/data/small.log");
 
+const TEAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/team.toml");
+
 /// What the demo draws into.
 const FILE: &str = "rohrpost-demo.rrd";
 
@@ -34,12 +36,17 @@ impl Drawing {
     /// None where a demo of several nodes cannot be: without network namespaces.
     #[track_caller]
     fn where_possible(arguments: &[&str]) -> Option<Self> {
+        Self::by(&[&["demo", "--quiet"], arguments].concat())
+    }
+
+    /// None where the command needs network namespaces, and there are none.
+    #[track_caller]
+    fn by(command: &[&str]) -> Option<Self> {
         let (rerun, bridge) = (rerun(), bridge());
         let folder = tempfile::tempdir().unwrap();
         let began = Instant::now();
         let demo = Command::new(env!("CARGO_BIN_EXE_rohrpost"))
-            .args(["demo", "--quiet"])
-            .args(arguments)
+            .args(command)
             .env("PATH", search_path(&bridge))
             .env("ROHRPOST_DIR", folder.path().join("memory"))
             .current_dir(folder.path())
@@ -50,7 +57,7 @@ impl Drawing {
             rohrpost_testbed::report::skipped(&String::from_utf8_lossy(&demo.stderr));
             return None;
         }
-        let said = ok("demo", &demo);
+        let said = ok(&command.join(" "), &demo);
         assert!(!said.contains("left out"), "the bridge was not found:\n{said}");
         let file = folder.path().join(FILE);
         let verified = rrd(&rerun, "verify", &file);
@@ -205,6 +212,24 @@ fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
     let counts: Vec<u64> = robot.split_whitespace().map_while(|word| word.parse().ok()).collect();
     let [meant, _left, _replaced, came, ..] = counts[..] else { panic!("{robot}") };
     assert!(meant > 200 && came * 5 > meant * 4, "of some thousand a gap's are missing: {robot}");
+}
+
+/// Each robot is a system of its own, and so is the arena, which draws them all.
+#[test]
+fn a_team_is_drawn_in_space_from_all_its_systems() {
+    let launch = ["team", "launch", TEAM, "--robots", "3", "--seconds", "8", "--draw", FILE];
+    let drawing = Drawing::by(&launch).unwrap();
+    drawing.has("/space/walls", 1..=1);
+    let beats = 8..=60;
+    for robot in 1..=3 {
+        drawing.has(&format!("/space/robot/{robot}"), 20..=1500);
+        drawing.has(&format!("/space/way/{robot}"), beats.clone());
+        drawing.has(&format!("/modes/robot-{robot}"), 2..=60);
+        let groups = timed_rows(&drawing.file(), &format!("/groups/robot-{robot}"));
+        assert!(groups.iter().any(|(_, row)| row.contains("group 3, leader 1")), "robot {robot}: {groups:?}");
+    }
+    drawing.has("/modules/arena.0", 1..=4);
+    assert!(drawing.said.contains(&format!("drawing: {FILE}")), "{}", drawing.said);
 }
 
 #[test]

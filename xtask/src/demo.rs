@@ -4,8 +4,12 @@ use crate::beside::{self, Begun};
 use crate::cargo::{self, BRIDGE};
 use crate::crates;
 use crate::failure::Failure;
-use std::path::PathBuf;
-use std::process::{Command, ExitCode};
+use std::fs::File;
+use std::io::IsTerminal;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitCode};
+use std::time::{Duration, Instant};
 
 /// When the GUI bridge is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +34,7 @@ impl BridgeBuild {
     }
 }
 
-/// Builds what the demo needs and becomes it.
+/// Builds what the demo needs and becomes it; while the bridge is built, a terminal has the robot's map.
 pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
     crates::build("building rohrpost: the launcher and the modules", "rohrpost-cli", &["--bin", "rohrpost"])?;
     let programs = cargo::target().join("debug");
@@ -47,8 +51,37 @@ pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
     if is_later {
         demo.arg("--gui-build").arg(beside::shown_log());
     }
-    demo.env("PATH", path(programs, is_later)?);
+    demo.env("PATH", path(programs.clone(), is_later)?);
+    if is_later && args.is_empty() && std::io::stdout().is_terminal() && std::io::stdin().is_terminal() {
+        return beside_its_map(&mut demo, &programs.join("rohrpost"));
+    }
     become_it(&mut demo)
+}
+
+/// Longest wait for the robot of the demo.
+const START: Duration = Duration::from_secs(20);
+
+/// Runs the demo with its lines in a file, and the map of its robot on the terminal until the user has seen enough.
+fn beside_its_map(demo: &mut Command, rohrpost: &Path) -> Result<ExitCode, Failure> {
+    let log = cargo::target().join("demo.log");
+    let told = |error: std::io::Error| format!("{}: {error}", log.display());
+    let (out, err) = File::create(&log).and_then(|out| Ok((out.try_clone()?, out))).map_err(told)?;
+    // A group of its own: Ctrl-C on the terminal is for the map.
+    let mut running = demo.arg("--quiet").stdout(out).stderr(err).process_group(0).spawn().map_err(told)?;
+    let began = Instant::now();
+    let runs = |it: &mut Child| it.try_wait().is_ok_and(|ended| ended.is_none());
+    let is_seen = || Command::new(rohrpost).args(["list", "-i", "demo"]).output().is_ok_and(|it| it.status.success());
+    while runs(&mut running) && began.elapsed() < START && !is_seen() {
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    if runs(&mut running) {
+        // How it ended counts less than how the demo does.
+        let _ = Command::new(rohrpost).args(["top", "--map", "-i", "demo"]).status();
+        let _ = Command::new("kill").args(["-INT", &running.id().to_string()]).status();
+    }
+    let ended = running.wait().map_err(told)?;
+    print!("{}", std::fs::read_to_string(&log).map_err(told)?);
+    Ok(if ended.success() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// The search path with our programs before all else. While the bridge is built, no other one may take its place.
@@ -61,7 +94,6 @@ fn path(first: PathBuf, without_bridge: bool) -> Result<std::ffi::OsString, Fail
 
 /// Replaces this process, so that Ctrl-C, the exit code and the terminal are the demo's own.
 fn become_it(command: &mut Command) -> Result<ExitCode, Failure> {
-    use std::os::unix::process::CommandExt;
     let error = command.exec();
     Err(format!("cannot run {}: {error}", command.get_program().to_string_lossy()))
 }

@@ -6,7 +6,7 @@ mod asked;
 mod beyond;
 mod chaos;
 mod copy;
-mod folder;
+pub(crate) mod folder;
 mod gui;
 mod incarnations;
 mod losses;
@@ -44,7 +44,7 @@ const SETTLE: Duration = Duration::from_secs(2);
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let long = arguments.seconds.map(crate::terminal::units::seconds).transpose()?;
     if let Some(count) = arguments.team {
-        return team::run(count, long);
+        return team::run(count, long, !arguments.no_gui);
     }
     if let Some(count) = arguments.nodes.filter(|count| *count > 1) {
         if arguments.record.is_some() {

@@ -117,7 +117,8 @@ fn option(words: &[String], name: &str) -> Option<String> {
 
 fn target() -> Target {
     let words = words();
-    Target::new(option(&words, "--config").map(PathBuf::from), option(&words, "--node"))
+    let installation = option(&words, "--installation").or_else(|| option(&words, "-i"));
+    Target::new(option(&words, "--config").map(PathBuf::from), installation, option(&words, "--node"))
 }
 
 /// The configuration: the one named on the command line, or that of the running installation.

@@ -18,7 +18,7 @@ use rohrpost_config::{Installation, Reach};
 use rohrpost_launch::{Event, events, reap_orphans};
 use rohrpost_mailbox::node_directory;
 use rohrpost_routers::impair;
-use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
+use rohrpost_routers::lab::{Capture, Lab, NodeSpec};
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
@@ -69,7 +69,8 @@ pub(crate) struct LaunchedNodes<'a> {
     words: u32,
     /// The nodes are being stopped: their ends are expected.
     stopping: bool,
-    lab: Lab,
+    /// Their network; none: they share that of this computer.
+    lab: Option<Lab>,
     /// How each launch is started.
     start_with: StartWith,
 }
@@ -92,6 +93,8 @@ struct Node {
     ended: Option<ExitStatus>,
     /// Stop signals that it was sent.
     told: usize,
+    /// Its end was wanted.
+    killed: bool,
 }
 
 enum NodeEvent {
@@ -142,7 +145,7 @@ impl<'a> LaunchedNodes<'a> {
     /// When one cannot be started; then all are stopped.
     pub(crate) fn begin(
         installations: impl IntoIterator<Item = Arc<Installation>>,
-        lab: Lab,
+        lab: impl Into<Option<Lab>>,
         bad: Option<impair::ImpairmentSettings>,
         log: Option<&str>,
         speech: &'a Speech,
@@ -150,7 +153,7 @@ impl<'a> LaunchedNodes<'a> {
         let (sender, happenings) = sync_channel(LINES_MAX);
         listen(sender.clone())?;
         let start_with = StartWith { executable: std::env::current_exe()?, bad, log: log.map(str::to_owned), sender };
-        let (nodes, open, words, stopping) = (Vec::new(), 0, 0, false);
+        let (nodes, open, words, stopping, lab) = (Vec::new(), 0, 0, false, lab.into());
         let mut all = Self { nodes, happenings, open, speech, words, stopping, lab, start_with };
         for installation in installations {
             for node in &installation.nodes {
@@ -177,9 +180,12 @@ impl<'a> LaunchedNodes<'a> {
         }
         // A separate process group: Ctrl-C reaches only this command.
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
-        let mut child = self.lab.command(&name, &mut command).map_err(|error: LabError| Failure::from(error))?;
+        let mut child = match &self.lab {
+            Some(lab) => lab.command(&name, &mut command)?,
+            None => command.spawn()?,
+        };
         let (out, err) = (child.stdout.take(), child.stderr.take());
-        let node = Node { installation, name, child, runs: false, ended: None, told: 0 };
+        let node = Node { installation, name, child, runs: false, ended: None, told: 0, killed: false };
         match self.nodes.get_mut(index) {
             Some(before) => *before = node,
             None => self.nodes.push(node),
@@ -198,6 +204,7 @@ impl<'a> LaunchedNodes<'a> {
     pub(crate) fn kill(&mut self, name: &str) -> Result<(), Failure> {
         let Some(node) = self.nodes.iter_mut().find(|node| node.name == name) else { return Ok(()) };
         node.child.kill()?;
+        node.killed = true;
         // Those that end by themselves meanwhile are gone, too.
         if let Ok(memory) = rohrpost_mailbox::Node::open(&node_directory(&node.installation.name, name)) {
             let of = |participant| memory.process_of(&participant).ok().flatten();
@@ -219,13 +226,16 @@ impl<'a> LaunchedNodes<'a> {
     }
 
     /// The network between the nodes.
-    pub(crate) fn lab(&self) -> &Lab {
-        &self.lab
+    ///
+    /// # Errors
+    /// They share that of this computer.
+    pub(crate) fn lab(&self) -> Result<&Lab, Failure> {
+        self.lab.as_ref().ok_or_else(|| "the nodes have no network of their own".into())
     }
 
     /// Begins to capture the network's traffic.
     pub(crate) fn capture(&self) -> Result<Capture, Failure> {
-        Ok(self.lab.capture()?)
+        Ok(self.lab()?.capture()?)
     }
 
     /// Handles events for at most `period`, or until something happens; false when it is time to stop: a stop was
@@ -296,7 +306,7 @@ impl<'a> LaunchedNodes<'a> {
             let left = deadline.saturating_duration_since(Instant::now());
             self.happenings.recv_timeout(left).into_iter().for_each(|happening| self.note(happening));
         }
-        let well = self.nodes.iter().all(|node| node.ended.is_some_and(|status| status.success()));
+        let well = self.nodes.iter().all(|node| node.killed || node.ended.is_some_and(|status| status.success()));
         if well { ExitCode::SUCCESS } else { ExitCode::FAILURE }
     }
 }

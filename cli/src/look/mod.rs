@@ -15,7 +15,7 @@ use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
 use rohrpost::description::noted;
 use rohrpost::interface::DataPort;
-use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
+use rohrpost::interfaces::{BeyondHost, BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
 use rohrpost::output::plain;
 use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
@@ -120,6 +120,27 @@ impl Running {
         // A package to all systems gets no error when it is not delivered; only a timeout would show it.
         let told = self.takes_part().and_then(|()| self.newest(elsewhere, TcpInterface::HOSTS));
         Some(told.map_err(|error| format!("{error}; `rohrpost list` in the system that runs it shows them").into()))
+    }
+
+    /// Whether this is a mailbox for output lines. In any other module a mailbox of that local id has the module's own
+    /// data.
+    pub(crate) fn is_collector(&self, mailbox: Name) -> bool {
+        let class = self.installation.classes.id(rohrpost::output::CLASS);
+        class == Some(mailbox.class()) && mailbox.local() == rohrpost::output::LINES
+    }
+
+    /// Whether a host at the TCP router is none of this configuration, and no tool: tools come and go.
+    pub(crate) fn is_outside(&self, host: &BeyondHost) -> bool {
+        let name = Name::from_raw(host.first);
+        name.class() != self.installation.classes.tool() && self.installation.module(name).is_none()
+    }
+
+    /// Modules at the TCP router that this configuration does not have; without whole ranges of names.
+    pub(crate) fn modules_beyond(&self) -> Vec<Name> {
+        let Some(Ok(hosts)) = self.hosts_beyond() else { return Vec::new() };
+        let ends = |host: &BeyondHost| [host.first, host.last].map(|raw| Name::from_raw(raw).module());
+        let names = hosts.hosts.iter().filter(|host| self.is_outside(host)).map(ends);
+        names.filter(|[first, last]| first == last).map(|[name, _]| name).collect()
     }
 
     /// Whether the TCP router says that a client hosts this name.

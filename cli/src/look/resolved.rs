@@ -127,7 +127,7 @@ fn module(installation: &Installation, module: &Module) -> Value {
     json!({
         "name": text(&module.name),
         "number": module.name.raw(),
-        "line": module.line,
+        "line": installation.place(module.line).1,
         "priority": module.name.class().0,
         "scheduling": scheduling(installation.scheduling_of(module)),
         "aliases": module.aliases.iter()

@@ -7,13 +7,12 @@ use clap::Args;
 use rohrpost::output::plain;
 use rohrpost::{Fault, ToolLink};
 use rohrpost_config::{HOLDERS_FILE, Installation};
+use rohrpost_launch::choose_node;
 use rohrpost_launch::launcher::launcher_of;
 use rohrpost_launch::survey::{Scope, Standing, node_of};
-use rohrpost_launch::{CONFIG_FILE, choose_node};
-use rohrpost_mailbox::{Name, Node, NodeError, SendError, local, node_directory};
+use rohrpost_mailbox::{Name, Node, SendError, local};
+use rohrpost_modules::runtime::{NotHere, NotedNode, configuration_here, open_here};
 use std::cell::RefCell;
-use std::ffi::OsStr;
-use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,6 +25,9 @@ pub(crate) struct Target {
     /// Configuration of the nodes; without it, the one that runs here.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// Installation, by its name, where several run here.
+    #[arg(long, short, value_name = "NAME", conflicts_with = "config")]
+    installation: Option<String>,
     /// Use this node, and show it alone; default: the first of the configuration that runs here.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
@@ -64,8 +66,8 @@ pub(crate) struct Running {
 }
 
 impl Target {
-    pub(crate) fn new(config: Option<PathBuf>, node: Option<String>) -> Self {
-        Self { config, node }
+    pub(crate) fn new(config: Option<PathBuf>, installation: Option<String>, node: Option<String>) -> Self {
+        Self { config, installation, node }
     }
 
     /// The named configuration, if one is named.
@@ -73,29 +75,28 @@ impl Target {
         self.config.as_deref()
     }
 
+    /// Configuration of the selected installation, which runs here.
+    fn config_here(&self) -> Result<PathBuf, Failure> {
+        configuration_here(self.installation.as_deref(), self.node.as_deref()).map_err(|error| match error {
+            several @ NotHere::Several(_) => format!("{several}; say which with -i NAME, or with --config FILE").into(),
+            error => error.into(),
+        })
+    }
+
     /// Finds the selected node.
     pub(crate) fn find(&self) -> Result<Running, Failure> {
         let only = self.node.as_deref();
         let installation = match &self.config {
             Some(config) => Installation::load(config)?,
-            None => Installation::load(&config_here(only)?)?,
+            None => Installation::load(&self.config_here()?)?,
         };
-        let named = only.map(|name| choose_node(&installation, Some(name))).transpose()?;
-        // The named node, if it runs here; else the first that does.
-        let all = named.into_iter().chain(&installation.nodes);
-        let mut failed = None;
-        for config in all {
-            match Node::open(&node_directory(&installation.name, &config.name)) {
-                Ok(node) => {
-                    let (node_name, only) = (config.name.clone(), named.map(|node| node.name.clone()));
-                    let installation = at_holders(installation, &node)?;
-                    return Ok(Running { installation, node_name, node, only, observer: RefCell::default() });
-                }
-                Err(error @ NodeError::Missing(_)) => failed = failed.or(Some(error)),
-                Err(error) => return Err(error.into()),
-            }
+        if only.is_some() {
+            choose_node(&installation, only)?;
         }
-        Err(failed.map_or_else(|| "the configuration has no node".into(), Failure::from))
+        let (node_name, node) = open_here(&installation, only)?;
+        let (node_name, only) = (node_name.to_owned(), self.node.clone());
+        let installation = at_holders(installation, &node)?;
+        Ok(Running { installation, node_name, node, only, observer: RefCell::default() })
     }
 }
 
@@ -105,51 +106,11 @@ fn at_holders(installation: Installation, node: &Node) -> Result<Installation, F
     Ok(installation.at_holders(&String::from_utf8_lossy(&known)))
 }
 
-/// Configuration of the one installation that runs here, or of the one that has a node of this name.
-fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
-    let running = rohrpost::find_running();
-    if running.is_empty() {
-        // An unreadable node still exists, so the error must not say that there is none.
-        let others = rohrpost::find_unusable().into_iter().next();
-        return Err(others.map_or_else(
-            || "no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into(),
-            Failure::from,
-        ));
-    }
-    let note = |path: &PathBuf| noted_config(&*Node::open(path)?);
-    let noted: Vec<(PathBuf, String)> = running.iter().map(note).collect::<Result<_, Failure>>()?;
-    let is_meant = |(_, name): &&(PathBuf, String)| node.is_none_or(|node| node == name);
-    let mut configs: Vec<&PathBuf> = noted.iter().filter(is_meant).map(|(config, _)| config).collect();
-    if configs.is_empty() {
-        // It may be a node of another computer.
-        configs = noted.iter().map(|(config, _)| config).collect();
-    }
-    configs.sort_unstable();
-    configs.dedup();
-    match configs[..] {
-        [only] => Ok(only.clone()),
-        _ => {
-            let list: Vec<String> = running.iter().map(|path| path.display().to_string()).collect();
-            Err(format!("several nodes run here; say which with --config and --node:\n  {}", list.join("\n  ")).into())
-        }
-    }
-}
-
-/// Launch's record of its configuration.
-fn noted_config(node: &Node) -> Result<(PathBuf, String), Failure> {
-    let told = |what: &str| format!("{}: its file `{CONFIG_FILE}` {what}; say --config FILE", node.path().display());
-    let bytes = node.read_file(CONFIG_FILE)?.ok_or_else(|| told("is not there"))?;
-    match bytes.split(|byte| *byte == b'\n').collect::<Vec<_>>()[..] {
-        [config, node, b""] => Ok((OsStr::from_bytes(config).into(), String::from_utf8_lossy(node).into_owned())),
-        _ => Err(told("was written by another version of launch").into()),
-    }
-}
-
 impl Running {
     /// The same node after a new launch: its configuration may have changed.
     pub(crate) fn again(&self) -> Result<Self, Failure> {
         let node = Node::open(self.node.path())?;
-        let (config, node_name) = noted_config(&node)?;
+        let NotedNode { config, node: node_name } = NotedNode::of(&node)?;
         let (installation, only) = (at_holders(Installation::load(&config)?, &node)?, self.only.clone());
         Ok(Self { installation, node_name, node, only, observer: RefCell::default() })
     }

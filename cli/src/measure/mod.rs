@@ -1,6 +1,7 @@
 //! Commands that measure: rates, bytes, delays, answers, mailboxes and streams.
 
 pub(crate) mod bw;
+pub(crate) mod data;
 pub(crate) mod delay;
 pub(crate) mod graph;
 pub(crate) mod hz;

@@ -32,7 +32,7 @@ use recorded::RecordedFiles;
 use rohrpost::output::plain;
 use rohrpost::schema::Description;
 use rohrpost::wire::append;
-use rohrpost_config::{Installation, StreamSpec};
+use rohrpost_config::{Installation, StreamSpec, resolved_text};
 use rohrpost_launch::{Launch, events};
 use rohrpost_recorder::player::RATE_MAX;
 use session::ReplaySession;
@@ -295,7 +295,7 @@ fn source(
 ) -> Result<(Installation, PathBuf), Failure> {
     if let Some(path) = &arguments.config {
         let base = path.canonicalize().map_err(|error| format!("{}: {error}", path.display()))?;
-        let text = std::fs::read_to_string(path)?;
+        let text = resolved_text(path)?;
         return Ok((Installation::parse(&text, path)?, base.parent().unwrap_or(here).to_owned()));
     }
     if recorded.are_others {
@@ -317,12 +317,12 @@ fn source(
 
 /// Mistakes in a configuration that may be of others: a line each.
 fn told(errors: &rohrpost_config::Errors) -> String {
-    let file = plain::line(&errors.path().file_name().unwrap_or_default().to_string_lossy()).into_owned();
-    let problem = |problem: &rohrpost_config::Problem| {
-        let line = problem.line.map_or(String::new(), |line| format!(":{line}"));
-        format!("{file}{line}: {}", plain::line(&problem.message))
+    let problem = |(file, line, message): (PathBuf, Option<usize>, String)| {
+        let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let line = line.map_or(String::new(), |line| format!(":{line}"));
+        format!("{}{line}: {}", plain::line(&file), plain::line(&message))
     };
-    errors.problems().iter().map(problem).collect::<Vec<_>>().join("\n")
+    errors.placed().map(problem).collect::<Vec<_>>().join("\n")
 }
 
 /// What modules that are played have answered to commands, as bytes; none if the files have no journal of them.

@@ -2,6 +2,7 @@
 //! one that does not is named, and never told as stopped.
 
 use crate::look::control::{STATE, holders};
+use crate::look::newest;
 use crate::look::observer::{PATIENCE, Tool};
 use crate::look::target::{Running, Target};
 use crate::terminal::units::seconds;
@@ -9,17 +10,21 @@ use crate::terminal::{Failure, complain, say};
 use nix::sys::utsname::uname;
 use nix::unistd::{User, getuid};
 use rohrpost::interface::Interface;
-use rohrpost::interfaces::{ControlRefusal, ControlState, HeldHalt, SupervisorInterface};
+use rohrpost::interfaces::{
+    BeyondHosts, ControlRefusal, ControlState, HeldHalt, SupervisorInterface, TeamRouterInterface,
+};
 use rohrpost::output::plain;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Fault};
 use rohrpost_builtin::holder_text;
-use rohrpost_mailbox::{Name, realtime_ns};
+use rohrpost_mailbox::{Class, Name, local, realtime_ns};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+/// A supervisor is asked for so long, seconds.
+const TIMEOUT_S: f64 = 5.0;
 /// Functions of a supervisor.
 const HALT: u16 = 17;
 const RESUME: u16 = 18;
@@ -36,14 +41,14 @@ const PAUSE: Duration = Duration::from_millis(50);
 pub(crate) struct Which {
     #[command(flatten)]
     target: Target,
-    /// Robots of other systems, too, as far as the TCP router knows them.
+    /// Robots of other systems, too, as far as the routers know them.
     #[arg(long)]
     all: bool,
     /// The one that holds the robot; default: you, as USER@COMPUTER.
     #[arg(long = "as", value_name = "NAME")]
     holder: Option<String>,
     /// Ask for so long, seconds.
-    #[arg(long, default_value_t = 5.0, value_name = "SECONDS")]
+    #[arg(long, default_value_t = TIMEOUT_S, value_name = "SECONDS")]
     timeout: f64,
     /// Print JSON.
     #[arg(long)]
@@ -72,6 +77,19 @@ pub(crate) struct ResumeArguments {
     /// Let go what others hold, too. Ask them first.
     #[arg(long)]
     force: bool,
+}
+
+impl Which {
+    /// The robot of a node, asked by the person at this terminal.
+    fn on(target: Target) -> Self {
+        Self { target, all: false, holder: None, timeout: TIMEOUT_S, json: false }
+    }
+}
+
+/// Halts the robot of a node, or lets it go on that this person halted.
+pub(crate) fn halt_or_resume(target: Target, is_halt: bool) -> Result<ExitCode, Failure> {
+    let which = Which::on(target);
+    if is_halt { halt(&HaltArguments { which }) } else { resume(&ResumeArguments { which, force: false }) }
 }
 
 /// How it stands with one robot.
@@ -181,21 +199,46 @@ struct Robots {
     until: Instant,
 }
 
-/// Modules of other systems, as the TCP router knows them.
+/// Modules of other systems: as the TCP router knows them, and the first supervisors of those that the team's router
+/// hears.
 ///
 /// # Errors
 /// When some of them are not known: nobody is told that all were asked.
-fn elsewhere(running: &Running) -> Result<Vec<Name>, Failure> {
-    let hosts =
-        running.hosts_beyond().ok_or("--all: no [tcp] in the configuration, so there are no other systems")??;
+fn elsewhere(running: &Running, supervisors: Option<Class>) -> Result<Vec<Name>, Failure> {
+    let team = running.installation.team.is_some();
+    let mut names = match running.hosts_beyond() {
+        None if team => Vec::new(),
+        hosts => {
+            by_tcp(hosts.ok_or("--all: no [tcp] or [team] in the configuration, so there are no other systems")??)?
+        }
+    };
+    if team {
+        let router = running.module(TeamRouterInterface::CLASS)?;
+        let mut tool = running.join(PATIENCE)?;
+        let links = newest(&mut tool, router, TeamRouterInterface::LINKS);
+        let (_, links) = links.map_err(|error| running.told(router, &error))?;
+        let heard = links.nodes.iter().filter(|node| node.proven).map(|node| node.system);
+        names.extend(
+            heard
+                .zip(std::iter::repeat(supervisors))
+                .filter_map(|(system, class)| Some(Name::new(system, class?.0, 0, local::COMMANDS))),
+        );
+        if names.is_empty() {
+            return Err("--all: no other system is heard; `rohrpost net` says what is".into());
+        }
+    }
+    names.sort_unstable();
+    names.dedup();
+    Ok(names)
+}
+
+fn by_tcp(hosts: BeyondHosts) -> Result<Vec<Name>, Failure> {
     if hosts.more > 0 || hosts.hosts.iter().any(|host| host.last.wrapping_sub(host.first) > RANGE_MAX) {
         let why = "the TCP router has more names than it can tell; ask each robot by `--config FILE`, without --all";
         return Err(format!("--all: {why}").into());
     }
     let names = hosts.hosts.iter().flat_map(|host| host.first..=host.last);
-    let mut names: Vec<Name> = names.map(|raw| Name::from_raw(raw).module()).collect();
-    names.dedup();
-    Ok(names)
+    Ok(names.map(|raw| Name::from_raw(raw).module()).collect())
 }
 
 /// One question to one of them.
@@ -219,7 +262,7 @@ impl Robots {
         names.sort_by_key(|name| (!running.is_own(*name), *name));
         if which.all {
             let known = names.clone();
-            let others = elsewhere(&running)?;
+            let others = elsewhere(&running, id)?;
             names.extend(others.into_iter().filter(|name| is_supervisor(name) && !known.contains(name)));
         }
         if names.is_empty() {

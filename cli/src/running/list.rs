@@ -164,21 +164,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Modules that the TCP router knows and the configuration does not. Tools are left out: they come and go.
+/// Modules that the TCP router knows and the configuration does not.
 fn beyond(running: &Running, hosts: &BeyondHosts) -> Vec<BeyondLine> {
-    let installation = &running.installation;
-    let first = |host: &BeyondHost| Name::from_raw(host.first);
-    let is_other = |host: &&BeyondHost| {
-        let name = first(host);
-        name.class() != installation.classes.tool() && installation.module(name).is_none()
-    };
     let line = |host: &BeyondHost| {
-        let (name, last) = (first(host).module(), Name::from_raw(host.last).module());
+        let (name, last) = (Name::from_raw(host.first).module(), Name::from_raw(host.last).module());
         let text = |name| running.text(name);
         let module = if name == last { text(name) } else { format!("{} to {}", text(name), text(last)) };
         BeyondLine { module, system: name.system(), by: host.client.clone() }
     };
-    hosts.hosts.iter().filter(is_other).map(line).collect()
+    hosts.hosts.iter().filter(|host| running.is_outside(host)).map(line).collect()
 }
 
 pub(crate) fn mailbox_lines(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<MailboxLine> {

@@ -1,5 +1,6 @@
 //! `rohrpost team`: what a robot knows of its team.
 
+use super::{kill, launch};
 use crate::look::newest;
 use crate::look::target::Inquiry;
 use crate::terminal::table::{table, time};
@@ -14,16 +15,34 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:
   rohrpost team
   rohrpost team team.0 --json
+  rohrpost team launch config/team.toml --robots 8
 `way`: how its hellos come, `direct` or through so many robots. `silent`: age of its newest hello. `clock`: its clock \
-minus this robot's, and the greatest error. Exit code 1: the module does not answer, or views of the team differ.")]
+minus this robot's, and the greatest error. Exit code 1: the module does not answer, or views of the team differ."
+)]
 pub(crate) struct Arguments {
     /// Module of the team; without it, the only one of class `team`.
     name: Option<String>,
     #[command(flatten)]
     inquiry: Inquiry,
+    #[command(subcommand)]
+    command: Option<TeamCommand>,
+}
+
+#[derive(clap::Subcommand)]
+enum TeamCommand {
+    /// Launch all robots of a team on this computer, and the arena in which they are simulated.
+    Launch(launch::Arguments),
+    /// Kill all processes of a robot, as a cut of its power does.
+    Kill(kill::Arguments),
+    /// Halt all robots that run here.
+    Stop,
+    /// Let all robots go on that you halted.
+    Resume,
 }
 
 /// A state for programs, with what it says together.
@@ -37,6 +56,13 @@ struct Told<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    match &arguments.command {
+        Some(TeamCommand::Launch(arguments)) => return launch::run(arguments),
+        Some(TeamCommand::Kill(arguments)) => return kill::run(arguments),
+        Some(TeamCommand::Stop) => return kill::halt_all(true),
+        Some(TeamCommand::Resume) => return kill::halt_all(false),
+        None => {}
+    }
     let running = arguments.inquiry.target.find()?;
     let module = running.module(arguments.name.as_deref().unwrap_or(TeamInterface::CLASS))?;
     let mut tool = running.join(arguments.inquiry.timeout()?)?;
@@ -57,23 +83,27 @@ fn view_digest(state: &TeamState) -> String {
 
 /// The verdict, then a row for each robot, then what there is beside it.
 fn text(state: &TeamState) -> String {
+    format!("{}\n\n{}", verdict(state), tables(state))
+}
+
+/// Which group it is, and whether its robots agree.
+pub(crate) fn verdict(state: &TeamState) -> String {
     let fresh = state.members.iter().filter(|member| member.fresh).count() + 1;
     let views = match state.differs_ms {
         None => "views are equal".to_owned(),
         Some(since_ms) => format!("views differ since {}", ms(since_ms)),
     };
-    let mut text = format!(
-        "group {} of {}, led by robot {}; {views}\n\n",
-        state.group,
-        counted(fresh as u64, "robot"),
-        state.leader
-    );
+    format!("group {} of {}, led by robot {}; {views}", state.group, counted(fresh as u64, "robot"), state.leader)
+}
+
+/// A row for each robot, then what there is beside it.
+pub(crate) fn tables(state: &TeamState) -> String {
     let own = [state.robot.to_string(), "here".into(), String::new(), place(state.pose), String::new(), String::new()];
     let mut rows: Vec<(u8, [String; 6])> = state.members.iter().map(|member| (member.robot, row(member))).collect();
     rows.push((state.robot, own));
     rows.sort_unstable();
     let heads = [">robot", "way", ">silent", "place", ">place's age", ">clock"];
-    text += &table(heads, rows.into_iter().map(|(_, row)| row));
+    let mut text = table(heads, rows.into_iter().map(|(_, row)| row));
     text += &state.notices.iter().map(|notice| format!("\n{}", notice_text(*notice))).collect::<String>();
     let objects: Vec<[String; 5]> = state.objects.iter().map(|object| object_row(object, state)).collect();
     if !objects.is_empty() {

@@ -4,12 +4,12 @@ use std::ffi::OsString;
 
 /// What is typed by habit, and our command for it.
 const HABITS: [(&str, &str, &str); 15] = [
-    ("topic", "list", "rohrpost graph"),
+    ("topic", "list", "rohrpost data"),
     ("topic", "echo", "rohrpost echo MODULE [DATA]"),
     ("topic", "hz", "rohrpost hz MODULE [DATA]"),
     ("topic", "bw", "rohrpost bw MODULE"),
     ("topic", "delay", "rohrpost delay MODULE"),
-    ("topic", "info", "rohrpost call MODULE"),
+    ("topic", "info", "rohrpost data MODULE"),
     ("topic", "pub", "rohrpost send MODULE FUNCTION [ARGUMENTS...]"),
     ("node", "list", "rohrpost list"),
     ("node", "info", "rohrpost call MODULE"),

@@ -2,6 +2,7 @@
 
 pub(crate) mod habits;
 pub(crate) mod parser;
+pub(crate) mod raw;
 pub(crate) mod speech;
 pub(crate) mod table;
 pub(crate) mod units;

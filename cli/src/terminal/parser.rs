@@ -8,12 +8,12 @@ use std::ffi::OsString;
 /// Headings and their subcommands, in the order in which a newcomer needs them.
 const GROUPS: [(&str, &[&str]); 9] = [
     ("To begin", &["demo", "new", "interface", "check", "launch"]),
-    ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status", "halt", "resume"]),
+    ("A robot that runs", &["list", "top", "log", "data", "echo", "call", "param", "status", "halt", "resume"]),
     ("One of its modules", &["restart", "stop", "start"]),
     ("To measure", &["hz", "bw", "delay", "mailbox", "stream", "graph", "ping", "send"]),
     ("Recordings", &["record", "replay"]),
     ("Several nodes", &["net", "time", "keys", "bundle"]),
-    ("Teams of robots", &["team", "path", "entrances"]),
+    ("Teams of robots", &["team", "wormhole", "station", "path", "entrances"]),
     ("This computer", &["doctor", "bench", "clean", "completions", "man", "version"]),
     ("Else", &["run", "arena", "router", "tcp-router", "tcp-client", "team-router", "help"]),
 ];

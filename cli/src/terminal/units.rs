@@ -86,6 +86,15 @@ pub(crate) fn fine(seconds: f64) -> String {
     }
 }
 
+/// A rate with two digits or more.
+pub(crate) fn per_second(rate: f64) -> String {
+    match rate {
+        rate if rate < 0.95 => format!("{rate:.2}/s"),
+        rate if rate < 9.5 => format!("{rate:.1}/s"),
+        rate => format!("{rate:.0}/s"),
+    }
+}
+
 /// Bytes in the unit that suits them: powers of 1000, as rates are given.
 pub(crate) fn bytes(bytes: f64) -> String {
     match bytes {

@@ -21,6 +21,7 @@ mod parameters;
 mod peers;
 mod record;
 mod streams;
+mod tool;
 
 pub use context::NativeContext;
 pub use error::NativeError;
@@ -41,3 +42,4 @@ pub use rohrpost_modules::wire::append;
 pub use rohrpost_modules::{CommandFailure, ModuleError};
 pub use rohrpost_schema as schema;
 pub use streams::{NativeStream, StayingRecord};
+pub use tool::{CopiedRecord, NativeTool, ToolData, ToolError, ToolStream};

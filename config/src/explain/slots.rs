@@ -1,9 +1,10 @@
 //! Explains time slots: a drawing of the cycle, the slots, the bounds of the flows, and what is left for replicas.
 
 use super::{Page, timeline};
+use crate::flow::Flow;
 use crate::plan::{bounds, plan};
 use crate::units::{duration_decimal, duration_text, rate_text, size_about, size_text};
-use rohrpost_network::{Bound, GATE, LATE, Tdma, TimeSlot, round_up};
+use rohrpost_network::{Bound, FlowBound, GATE, LATE, Tdma, TimeSlot, round_up};
 use std::time::Duration;
 
 /// Below it some slots begin too late for their successors; see the book's chapter.
@@ -58,6 +59,28 @@ impl Page<'_> {
             self.line(format!("  {node:width$}  {offset:>8}  {length:>8}  {bytes:>9}  {}", there(slot)));
         }
         self.line("bytes: what the link carries before the guard, the heads of Ethernet, IP and UDP counted.");
+    }
+
+    /// Whether all flows between nodes keep their deadlines, and which one is nearest to its own.
+    pub(super) fn verdict(&mut self) {
+        let bounds = bounds(self.installation);
+        let all: Vec<(&FlowBound, &Flow)> =
+            bounds.iter().map(|bound| (bound, &self.installation.flows[bound.flow])).collect();
+        let worst = |bound: &FlowBound| bound.latency.as_ref().ok().map(|latency| latency.latency);
+        let kept = all.iter().filter(|(bound, flow)| worst(bound).is_some_and(|worst| worst <= flow.deadline)).count();
+        let share = |worst: Duration, flow: &Flow| worst.as_secs_f64() / flow.deadline.as_secs_f64();
+        let tightest = all.iter().filter_map(|(bound, flow)| Some((worst(bound)?, *flow)));
+        let Some((worst, flow)) = tightest.max_by(|a, b| share(a.0, a.1).total_cmp(&share(b.0, b.1))) else { return };
+        let kept = if kept == all.len() { "kept".into() } else { format!("{} not kept", all.len() - kept) };
+        let words = format!(
+            "{} between nodes, {kept}; the tightest is {} → {}, at worst {} of {}",
+            all.len(),
+            self.name(flow.from),
+            self.name(flow.to),
+            round(worst),
+            duration_decimal(flow.deadline)
+        );
+        self.entry("flows", &words);
     }
 
     /// The worst cases of flows.

@@ -129,6 +129,36 @@ fn pictures_and_points_are_beside_the_world_and_charts_beside_them() {
 }
 
 #[test]
+fn a_team_comes_before_the_world_and_its_timelines_beside_it() {
+    let lanes = Tab::own("Modes", || StateTimelineView::new("Modes")).beside();
+    let eye_m = [[4.0, -2.0, 6.0], [4.0, 3.0, 0.0]];
+    let sent = Sent::of(vec![Tab::curves("Wheels", "motion"), Tab::floor("Team", "/space", Some(eye_m)), lanes]);
+    assert_eq!(
+        sent.outline(),
+        "Horizontal 7 4
+  Vertical 4 1
+    Tabs
+      Team
+      World
+      Wheels
+      Vertical 4 5 3
+        Packages per second, by class
+        Latency, µs: p99, and median (dim)
+        Packages lost since start
+    Tabs
+      Output
+      Modules
+      Modules now
+  Vertical
+    Tabs
+      Modes"
+    );
+    let eye = format!("{}/EyeControls3D", sent.view("Team"));
+    let place = sent.all::<Position3D>(&eye, &EyeControls3D::descriptor_position());
+    assert_eq!(place, [eye_m[0].into()]);
+}
+
+#[test]
 fn a_picture_of_another_node_has_its_delay_below_it() {
     let delay = EntityPath::from(vec!["delay".into(), "camera.0/image".into()]);
     let sent = Sent::of(vec![picture("camera.0 image").over_curves("both".into(), "Delay, ms".into(), delay)]);

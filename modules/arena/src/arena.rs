@@ -93,6 +93,11 @@ impl Arena {
         Ok(Self { map, placement, world, settings, robots, intruders, referee, wave: Wave::default(), now_ns: 0 })
     }
 
+    /// Time begins here; for an arena in which nobody is yet.
+    pub fn begin_at(&mut self, now_ns: u64) {
+        self.now_ns = now_ns;
+    }
+
     /// Puts a robot in the middle of a cell.
     ///
     /// # Errors

@@ -17,6 +17,7 @@
 #![forbid(unsafe_code)]
 
 mod arena;
+mod entrances;
 mod intruder;
 mod referee;
 

@@ -1,7 +1,7 @@
 //! What built-in modules would refuse of a configuration, told before anything runs. The crate `config` knows no
 //! modules, so it is here that both meet.
 
-use super::{Builtin, description, team, wormhole};
+use super::{Builtin, description, payload, station, team, world, wormhole};
 use rohrpost_config::{
     Document, GUI, Installation, Module, Problem, Program, RECORDER, REPLAY, RecordedItems, Show, nearest, size_text,
 };
@@ -25,6 +25,9 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
     }
     problems.extend(wormhole::problems(installation, &document));
     problems.extend(team::problems(installation, &document));
+    problems.extend(payload::problems(installation, &document));
+    problems.extend(station::problems(installation, &document));
+    problems.extend(world::problems(installation, &document));
     for show in &installation.gui.show {
         problems.extend(data_of(installation, show));
         problems.extend(far_stream_of(installation, show));

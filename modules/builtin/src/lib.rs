@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod arena;
+mod body;
 mod carmen;
 mod check;
 pub mod format;
@@ -14,10 +15,13 @@ mod map;
 mod mapper;
 mod mischief;
 mod output;
+mod payload;
 mod pilot;
 mod settings;
 mod sim;
+mod station;
 mod team;
+mod world;
 mod wormhole;
 
 pub use arena::{ArenaError, OpenArena};
@@ -56,10 +60,14 @@ impl Builtin {
     fn find(name: &str) -> Option<Self> {
         Some(match name {
             sim::NAME => Self::of::<sim::Sim>(),
+            world::NAME => Self::of::<world::ArenaModule>(),
+            "body" => Self::of::<body::BodyModule>(),
             "carmen" => Self::of::<carmen::Carmen>(),
             "mapper" => Self::of::<mapper::MapModule>(),
             "mischief" => Self::of::<mischief::MischiefModule>(),
+            payload::NAME => Self::of::<payload::PayloadModule>(),
             "pilot" => Self::of::<pilot::PilotModule>(),
+            station::NAME => Self::of::<station::StationModule>(),
             "team" => Self::of::<team::TeamModule>(),
             "wormhole" => Self::of::<wormhole::WormholeModule>(),
             "output" => Self::of::<output::OutputModule>(),
@@ -80,11 +88,14 @@ pub fn run(name: &str, start: Start) -> Option<Result<(), StartError>> {
 pub fn of_class(class: &str) -> Option<&'static str> {
     let all = [
         sim::NAME,
+        world::NAME,
         "carmen",
         "mapper",
         "pilot",
         "mischief",
         "team",
+        payload::NAME,
+        station::NAME,
         "wormhole",
         "output",
         RECORDER,

@@ -80,7 +80,7 @@ pub(super) fn module<M: Module<Settings: Settings>>(document: &Document<'_>, mod
         Ok(settings) => settings,
         Err(error) => {
             let message = format!("{what}: settings: {}", error.message);
-            problems.push(Problem { line: Some(error.line), message });
+            problems.push(Problem { line: Some(error.text_line), message });
             return problems;
         }
     };

@@ -4,17 +4,22 @@
 //! Each beat it looks around, sends what is new and a hello to system 255, and publishes its state. Whichever way there
 //! is carries the messages: the TCP router, or that of `[team]`.
 
+mod air;
 mod check;
+mod clock;
 mod settings;
-mod state;
-mod store;
+pub(crate) mod state;
+pub(crate) mod store;
 mod surroundings;
 
 use super::settings::Settings as _;
+pub(crate) use air::Air;
+use air::{HELLO, MESSAGES, RECORDS, SLOTS};
 pub(super) use check::problems;
+pub(crate) use clock::OwnClock;
 use rohrpost_mailbox::{ALL_SYSTEMS, Name, Shape};
 use rohrpost_modules::interfaces::{Team, TeamCounts, TeamInterface, TeamObjectId, TeamRefusal};
-use rohrpost_modules::runtime::{Context, ModuleClock, Received};
+use rohrpost_modules::runtime::{Context, Received};
 use rohrpost_modules::{Module, ModuleError};
 use rohrpost_team::group::Hello;
 use rohrpost_team::view::{RECORDS_BYTES_MAX, Records};
@@ -25,14 +30,6 @@ use std::time::Duration;
 use store::Store;
 use surroundings::Surroundings;
 
-/// Mailbox for messages of teammates: local id 3.
-const MESSAGES: u8 = 3;
-/// Data numbers of the messages; 1 is the state.
-const HELLO: u16 = 2;
-const RECORDS: u16 = 3;
-/// Messages that may wait: several beats of a large team.
-const SLOTS: u16 = 256;
-
 pub(super) struct TeamModule {
     team: TeamCore,
     clock: OwnClock,
@@ -42,25 +39,6 @@ pub(super) struct TeamModule {
     beat_ms: u32,
     counts: TeamCounts,
     told: TeamTold,
-}
-
-/// The robot's clock in its team: system time when the module began, and since then the computer's clock, which no step
-/// of system time makes wait or jump.
-struct OwnClock {
-    clock: ModuleClock,
-    ahead_ns: u64,
-}
-
-impl OwnClock {
-    fn begin(context: &Context) -> Self {
-        let clock = context.clock().clone();
-        let ahead_ns = clock.now().ns.saturating_sub(clock.monotonic_ns());
-        Self { clock, ahead_ns }
-    }
-
-    fn now_ns(&self) -> u64 {
-        self.clock.monotonic_ns().saturating_add(self.ahead_ns)
-    }
 }
 
 impl Module for TeamModule {
@@ -75,7 +53,7 @@ impl Module for TeamModule {
         let body_bytes_max = (rohrpost_modules::common::DataHead::BYTES + RECORDS_BYTES_MAX) as u16;
         context.open_mailbox_to_all(MESSAGES, Shape { slots: SLOTS, body_bytes_max, ..Shape::default() })?;
         let surroundings = Surroundings::open(&settings, context)?;
-        let (store, incarnation) = Store::open(&settings, context);
+        let (store, incarnation) = Store::open(settings.store.as_deref(), context);
         context.use_computer_clock();
         context.set_period(Duration::from_millis(settings.beat_ms.into()));
         Ok(Self {

@@ -8,7 +8,7 @@
 mod check;
 mod held;
 mod navigation;
-mod program;
+pub(super) mod program;
 mod settings;
 mod state;
 

@@ -5,7 +5,7 @@ use crate::disk::{self, At, FileError};
 use crate::key::{KEY_BYTES_MAX, KeyError, Signature, Trusted};
 use crate::manifest::{FileEntry, MANIFEST_BYTES_MAX, Manifest, ManifestError};
 use crate::path::lexical;
-use rohrpost_config::Installation;
+use rohrpost_config::{Installation, resolved_text};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
@@ -203,7 +203,7 @@ impl Bundle {
     /// Path in the bundle at which a robot saves parameters, as the configuration says.
     fn saved_parameters(&self) -> Option<PathBuf> {
         let configuration = self.manifest.configuration();
-        let text = fs::read_to_string(configuration.below(&self.folder)).ok()?;
+        let text = resolved_text(&configuration.below(&self.folder)).ok()?;
         let saved = Installation::parse(&text, configuration.as_str().as_ref()).ok()?.parameters?;
         Some(lexical(&saved)).filter(|saved| saved != Path::new(configuration.as_str()))
     }

@@ -16,6 +16,5 @@ pub mod launcher;
 pub mod survey;
 
 pub use launch::{
-    CONFIG_FILE, Event, Launch, LaunchError, LeaseError, NotStarted, Permit, choose_node, events, reap_orphans,
-    stop_flag,
+    Event, Launch, LaunchError, LeaseError, NotStarted, Permit, choose_node, events, reap_orphans, stop_flag,
 };

@@ -3,17 +3,21 @@
 
 use crate::event::Event;
 use crate::mode::Mode;
-use crate::state::State;
+use crate::state::{News, State};
 use rohrpost_modules::types::Pose;
 use rohrpost_team::coordination::{Duty, Target, Traffic};
 use rohrpost_team::grid::Cell;
 
 /// So near to the middle of its cell, all of the robot's body is in it, metres.
-const IN_CELL_M: f64 = 0.2;
+const IN_CELL_M: f64 = 0.24;
 /// A robot that does not come to the cell that it enters for so long turns back, ns.
-const TURN_BACK_NS: u64 = 10_000_000_000;
+const TURN_BACK_NS: u64 = 6_000_000_000;
 /// Another goal is chosen after so long, ns.
 const GOAL_NS: u64 = 40_000_000_000;
+/// Goals are looked for no more often, ns.
+const CHOICE_NS: u64 = 1_000_000_000;
+/// Another goal is chosen so many steps before this one, so that all have agreed on ways to it when the robot is there.
+const STEPS_AHEAD: usize = 2;
 
 /// A teammate says where it is and which cell it claims.
 pub(crate) fn hear(state: &mut State, now_ns: u64, event: &Event) {
@@ -33,12 +37,18 @@ pub(crate) fn coordinate(state: &mut State, now_ns: u64) {
         state.navigation.destination = duty.map(|cell| (cell, now_ns));
     } else {
         traffic.set_intruders(Vec::new());
-        traffic.set_goal(goal(state, now_ns));
+        traffic.set_goal(goal(state, &traffic, now_ns));
     }
-    if let Some(message) = traffic.poll(now_ns, &state.ground.grid) {
+    if let Some(message) = traffic.poll(now_ns, &mut state.ground.planner()) {
         state.outbox.push(message.encode());
     }
     state.navigation.next = if state.navigation.turns_back { None } else { traffic.next_cell() };
+    let me = state.team.group().me();
+    let no_way = traffic.given_up().iter().find(|(robot, _)| *robot == me).map(|(_, why)| *why);
+    if no_way != state.no_way {
+        state.no_way = no_way;
+        no_way.into_iter().for_each(|why| state.tell(News::NoWay(why)));
+    }
     state.traffic = Some(traffic);
 }
 
@@ -58,6 +68,8 @@ fn place(state: &mut State, traffic: &mut Traffic, now_ns: u64) {
     }
     if std::mem::take(&mut navigation.turns_back) {
         traffic.turned_back();
+        // Something that no plan knows is in the way: the robot goes elsewhere, if it may choose.
+        navigation.destination = None;
     }
     traffic.set_place(Some(here));
 }
@@ -70,20 +82,25 @@ fn targets(state: &State) -> Vec<Target> {
     certain.filter_map(target).collect()
 }
 
-/// Somewhere on the map while it wanders, near where the intruder was while it searches.
-fn goal(state: &mut State, now_ns: u64) -> Option<Cell> {
+/// Where it is the first to be while it wanders, near where the intruder was while it searches.
+fn goal(state: &mut State, traffic: &Traffic, now_ns: u64) -> Option<Cell> {
     let here = state.cell()?;
-    let is_over = |(cell, since_ns): (Cell, u64)| cell == here || now_ns.saturating_sub(since_ns) > GOAL_NS;
-    if state.navigation.destination.is_none_or(is_over) {
-        let (middle, steps) = match state.mode {
+    let is_near = traffic.steps_left().is_some_and(|steps| steps <= STEPS_AHEAD);
+    let is_over = |(_, since_ns): (Cell, u64)| is_near || now_ns.saturating_sub(since_ns) > GOAL_NS;
+    let is_time = state.navigation.chose_ns.is_none_or(|at_ns| now_ns.saturating_sub(at_ns) >= CHOICE_NS);
+    if is_time && state.navigation.destination.is_none_or(is_over) {
+        state.navigation.chose_ns = Some(now_ns);
+        let others: Vec<Cell> = traffic.others(now_ns).collect();
+        let near = match state.mode {
             Mode::Searching => {
                 let last = state.intruders(false);
-                (state.navigation.one_of(&last)?, state.settings.search_steps)
+                let last = state.navigation.one_of(&last)?;
+                state.cells_near(last, state.settings.search_steps)
             }
-            Mode::Wandering | Mode::Blocking => (here, u32::MAX),
+            Mode::Wandering | Mode::Blocking => state.cells_nearest(here, &others),
         };
-        let near = state.cells_near(middle, steps);
-        state.navigation.destination = state.navigation.one_of(&near).map(|cell| (cell, now_ns));
+        let free: Vec<Cell> = near.into_iter().filter(|cell| !others.contains(cell)).collect();
+        state.navigation.destination = state.navigation.one_of(&free).map(|cell| (cell, now_ns));
     }
     state.navigation.destination.map(|(cell, _)| cell)
 }

@@ -1,22 +1,11 @@
 //! Events of the tree, and the bytes of those that go to teammates.
 
+use crate::request::{Report, Request};
 use rohrpost_team::Position;
 use rohrpost_team::coordination::TrafficMessage;
-use rohrpost_team::events::EventType;
+use rohrpost_team::events::{EventHead, EventType};
 use rohrpost_team::group::Hello;
 use rohrpost_team::view::Records;
-
-/// Characters of a report at most.
-const REPORT_MAX: usize = 1000;
-
-/// What a station asks of all mobiles (seed 000, 4.5.3).
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Request {
-    /// Each mobile is to send its view as a text.
-    Info,
-    /// Each mobile is to end.
-    Quit,
-}
 
 /// What events carry.
 #[derive(Clone, Debug)]
@@ -40,7 +29,7 @@ pub(crate) enum Event {
     /// Of a station.
     Request(Request),
     /// Of a mobile, for people.
-    Report(String),
+    Report(Report),
 }
 
 /// Types of events, as the plan numbers them.
@@ -59,28 +48,29 @@ pub(crate) struct Types {
     pub(crate) report: EventType,
 }
 
+impl Types {
+    /// All of them.
+    pub(crate) fn all(&self) -> impl Iterator<Item = EventType> {
+        let Self { beat, pose, obstacle, object, heard, synchro, traffic, moved, command, request, report } = *self;
+        [beat, pose, obstacle, object, heard, synchro, traffic, moved, command, request, report].into_iter()
+    }
+}
+
 impl Event {
     /// The bytes behind the head; `None` of an event that does not leave its robot.
     pub(crate) fn encode(&self) -> Option<Vec<u8>> {
         match self {
-            Self::Request(Request::Info) => Some(vec![1]),
-            Self::Request(Request::Quit) => Some(vec![2]),
-            Self::Report(text) => Some(text.chars().take(REPORT_MAX).collect::<String>().into_bytes()),
+            Self::Request(request) => Some(request.encode()),
+            Self::Report(report) => Some(report.encode()),
             _ => None,
         }
     }
 
-    /// Reads what stands behind the head of an event with this number; `None` if that is no event of this type.
-    pub(crate) fn decode(number: u8, bytes: &[u8], types: Types) -> Option<Self> {
-        if number == types.request.number() {
-            let request = match bytes {
-                [1] => Request::Info,
-                [2] => Request::Quit,
-                _ => return None,
-            };
-            return Some(Self::Request(request));
+    /// Reads what stands behind the head of an event; `None` if that is no event of its type.
+    pub(crate) fn decode(head: &EventHead, bytes: &[u8], types: Types) -> Option<Self> {
+        if head.event_type == types.request.number() {
+            return Request::decode(head.from, bytes).map(Self::Request);
         }
-        let text = str::from_utf8(bytes).ok().filter(|text| text.chars().count() <= REPORT_MAX);
-        text.filter(|_| number == types.report.number()).map(|text| Self::Report(text.into()))
+        Report::decode(bytes).filter(|_| head.event_type == types.report.number()).map(Self::Report)
     }
 }

@@ -1,9 +1,11 @@
 //! The floor on which a team drives: a map, with the size of its cells.
 
 use rohrpost_robot::world::{World, WorldError};
+use rohrpost_team::coordination::Planner;
 use rohrpost_team::grid::{Cell, Grid, Map, MapError, Placement};
 use rohrpost_team::view::map_digest;
 use rohrpost_team::{Position, group};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Why a text is no floor for a team.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -29,6 +31,8 @@ pub struct Ground {
     pub(crate) world: World,
     pub(crate) placement: Placement,
     pub(crate) digest: u64,
+    /// Of all robots that share this floor.
+    planner: Arc<Mutex<Planner>>,
     cell_m: f64,
 }
 
@@ -44,7 +48,13 @@ impl Ground {
         let first = map.grid.cells().map(|(cell, _)| cell).find(|cell| map.grid.is_path(*cell));
         let world = World::with_walls(&map, cell_m, first.ok_or(NoGround::NoPath)?, None)?;
         let placement = Placement::new(cell_m, margin_m).ok_or(WorldError::CellSize(margin_m))?;
-        Ok(Self { grid: map.grid, world, placement, digest: map_digest(text), cell_m })
+        let planner = Arc::new(Mutex::new(Planner::new(map.grid.clone())));
+        Ok(Self { planner, grid: map.grid, world, placement, digest: map_digest(text), cell_m })
+    }
+
+    /// What plans on this floor. A plan that panicked was not kept.
+    pub(crate) fn planner(&self) -> MutexGuard<'_, Planner> {
+        self.planner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Walls and paths.
@@ -60,6 +70,16 @@ impl Ground {
     /// Side of a cell, metres.
     pub fn cell_m(&self) -> f64 {
         self.cell_m
+    }
+
+    /// Digest of the map, as teams tell it.
+    pub fn digest(&self) -> u64 {
+        self.digest
+    }
+
+    /// The middle of a cell: x and y, metres.
+    pub fn middle_m(&self, cell: Cell) -> (f64, f64) {
+        self.placement.middle_m(&self.grid, cell)
     }
 
     /// The cell of a place that a teammate has told.

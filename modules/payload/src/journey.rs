@@ -10,6 +10,8 @@ pub(crate) struct Navigation {
     pub(crate) next: Option<Cell>,
     /// Where the way ends, if the mode has such a place, and since when, ns.
     pub(crate) destination: Option<(Cell, u64)>,
+    /// When it looked for such a place last, ns.
+    pub(crate) chose_ns: Option<u64>,
     /// The cell in which the robot was last, and since when, ns.
     pub(crate) place: Option<(Cell, u64)>,
     /// The step by which it came there.
@@ -26,12 +28,22 @@ impl Navigation {
     pub(crate) fn new(seed: u64) -> Self {
         let (random, wave) = (ChaCha8Rng::seed_from_u64(seed), Wave::default());
         let (enters, turns_back) = (None, false);
-        Self { next: None, destination: None, place: None, came: None, enters, turns_back, random, wave }
+        Self {
+            next: None,
+            destination: None,
+            chose_ns: None,
+            place: None,
+            came: None,
+            enters,
+            turns_back,
+            random,
+            wave,
+        }
     }
 
     /// Another mode has other destinations.
     pub(crate) fn forget(&mut self) {
-        self.destination = None;
+        (self.destination, self.chose_ns) = (None, None);
     }
 
     /// The robot is in a cell. True if it was in another one.

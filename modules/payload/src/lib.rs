@@ -18,6 +18,8 @@
 //!   ([`rohrpost_team::coordination`]). Without it each plans for itself, as in the seed.
 //! - Cells are places on a continuous floor: the pilot steers along the line from middle to middle.
 //!
+//! [`Station`] is a person's place in the team: it has the same tree, so that robots know its events, and no body.
+//!
 //! Time is an argument, and chance comes from a seed. Nothing here reads a clock, sends, or waits.
 
 #![forbid(unsafe_code)]
@@ -31,15 +33,20 @@ mod mode;
 mod navigation;
 mod payload;
 mod remote;
+mod request;
 mod route;
+mod sender;
 mod settings;
 mod state;
+mod station;
 mod steering;
 mod tree;
 
-pub use event::Request;
 pub use ground::{Ground, NoGround};
 pub use mode::Mode;
 pub use payload::{NotHeard, Payload, Sensed};
+pub use request::{Answer, REPORT_CHARS_MAX, Report, Request, RequestId, RequestKind};
+pub use sender::sender;
 pub use settings::{RefusedSettings, Settings, Speeds};
 pub use state::{LostCause, News};
+pub use station::{Asked, Asking, FAKES_MAX, Said, Station, StationRefusal};

@@ -1,17 +1,19 @@
 //! One robot's program.
 
-use crate::event::{Event, Request, Types};
+use crate::event::{Event, Types};
 use crate::ground::{Ground, position};
 use crate::journey::Navigation;
 use crate::mode::Mode;
+use crate::request::{Report, Request};
 use crate::settings::{RefusedSettings, Settings};
 use crate::state::{Fix, LostCause, News, Seen, State};
 use crate::tree;
 use rohrpost_modules::types::{LaserScan, Pose};
 use rohrpost_robot::lookout::Lookout;
-use rohrpost_supervision::{Order, Promise};
+use rohrpost_supervision::{Command, Order, Promise};
 use rohrpost_team::coordination::{Sharing, Traffic, TrafficMessage};
-use rohrpost_team::events::{EventHead, Refused, Tree};
+use rohrpost_team::events::{EventHead, LossCause, Priority, Refused, Tree};
+use rohrpost_team::grid::Cell;
 use rohrpost_team::group::Hello;
 use rohrpost_team::view::Records;
 use rohrpost_team::{Malformed, RobotId, Team, TeamSettings};
@@ -88,19 +90,22 @@ impl Payload {
             fix: None,
             seen: None,
             lost: Some(LostCause::NoPose),
+            no_way: None,
             mode: Mode::default(),
             is_obstructed: false,
             navigation: Navigation::new(seed ^ u64::from(me.get())),
             outbox: Vec::new(),
             command: None,
             news: Vec::new(),
-            has_quit: false,
+            refused: None,
+            quit_beats: None,
         };
         Ok(Self { tree, types, state, order: Order { incarnation, sequence: 0 } })
     }
 
     /// The beat, twice a second or as the team's settings say.
     pub fn beat(&mut self, now_ns: u64) {
+        self.state.quit_beats = self.state.quit_beats.map(|beats| beats.saturating_sub(1));
         self.tree.hard(self.types.beat, Event::Beat);
         self.run(now_ns);
     }
@@ -148,7 +153,7 @@ impl Payload {
             }
             Some(b'E') => {
                 let (head, bytes) = EventHead::decode(message)?;
-                let event = Event::decode(head.event_type, bytes, self.types);
+                let event = Event::decode(&head, bytes, self.types);
                 self.tree.hear(&head, event.ok_or(NotHeard::Payload(head.event_type, head.from))?)?;
             }
             Some(b'T') => {
@@ -161,9 +166,15 @@ impl Payload {
         Ok(())
     }
 
-    /// A person at this station asks something of all mobiles.
+    /// A person at this station asks something of mobiles.
     pub fn ask(&mut self, now_ns: u64, request: Request) {
         self.tree.hard(self.types.command, Event::Request(request));
+        self.run(now_ns);
+    }
+
+    /// A person or program at this robot has a text for stations.
+    pub fn say(&mut self, now_ns: u64, text: String) {
+        self.tree.hard(self.types.command, Event::Report(Report { answers: None, text }));
         self.run(now_ns);
     }
 
@@ -186,6 +197,8 @@ impl Payload {
     /// The promise to the wormhole, if there is a new one.
     pub fn take_promise(&mut self) -> Option<Promise> {
         let command = self.state.command.take()?;
+        // A robot that is about to end stands.
+        let command = if self.state.quit_beats.is_some() { Command::STOP } else { command };
         self.order.sequence = self.order.sequence.wrapping_add(1);
         Some(Promise { order: self.order, duration_ns: self.state.settings.promise_ns, command })
     }
@@ -211,9 +224,42 @@ impl Payload {
         Some(self.state.ground.placement.middle_m(&self.state.ground.grid, cell))
     }
 
+    /// Where the robot is, as its sensors said last; `None` before the first pose.
+    pub fn pose(&self) -> Option<Pose> {
+        self.state.fix.map(|fix| fix.pose)
+    }
+
+    /// The cell in which the robot is; `None` while it is lost.
+    pub fn cell(&self) -> Option<Cell> {
+        self.state.cell()
+    }
+
+    /// Cells to which it goes, as far as they are planned: the next one first.
+    pub fn way(&self) -> Vec<Cell> {
+        match &self.state.traffic {
+            Some(traffic) => traffic.way(),
+            None => self.state.navigation.next.into_iter().collect(),
+        }
+    }
+
+    /// The floor on which it drives.
+    pub fn ground(&self) -> &Ground {
+        &self.state.ground
+    }
+
     /// What robots do about intruders, and exits that nobody holds; `None` without intruder, plan or coordination.
     pub fn sharing(&self) -> Option<&Sharing> {
         self.state.traffic.as_ref().and_then(Traffic::sharing)
+    }
+
+    /// How many events of a priority waited for leaves at a time at most.
+    pub fn queued_most(&self, priority: Priority) -> usize {
+        self.tree.queued_most(priority)
+    }
+
+    /// Events that were lost because their queues were full.
+    pub fn events_lost(&self) -> u64 {
+        self.types.all().map(|it| self.tree.lost(it, LossCause::QueueFull)).sum()
     }
 
     /// What it knows of its team.
@@ -221,8 +267,12 @@ impl Payload {
         &self.state.team
     }
 
-    /// Whether a station has told it to end.
+    pub(crate) fn team_mut(&mut self) -> &mut Team {
+        &mut self.state.team
+    }
+
+    /// Whether it is to end now: a station has told it some beats ago, in which it has acknowledged that.
     pub fn has_quit(&self) -> bool {
-        self.state.has_quit
+        self.state.quit_beats == Some(0)
     }
 }

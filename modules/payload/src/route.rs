@@ -101,6 +101,23 @@ impl State {
         cells.filter(|cell| wave.distance(*cell).is_some_and(|steps| (1..=reach).contains(&steps))).collect()
     }
 
+    /// Paths to which this robot is nearer than all others: robots that go there do not have to pass each other.
+    pub(crate) fn cells_nearest(&mut self, here: Cell, others: &[Cell]) -> Vec<Cell> {
+        let (grid, wave) = (&self.ground.grid, &mut self.navigation.wave);
+        let mut steps_from = |start: Cell| {
+            wave.start(grid, start, [], []);
+            while wave.next_goal().is_some() {}
+            grid.cells().map(|(cell, _)| wave.distance(cell).unwrap_or(u32::MAX)).collect::<Vec<u32>>()
+        };
+        let own = steps_from(here);
+        let mut least = vec![u32::MAX; own.len()];
+        for other in others {
+            least.iter_mut().zip(steps_from(*other)).for_each(|(least, steps)| *least = steps.min(*least));
+        }
+        let cells = grid.cells().map(|(cell, _)| cell).zip(own.into_iter().zip(least));
+        cells.filter(|(_, (own, least))| (1..*least).contains(own)).map(|(cell, _)| cell).collect()
+    }
+
     /// To the nearest entrance of any intruder of which the place is certain.
     fn block(&mut self, now_ns: u64, here: Cell, mut obstacles: Vec<Obstacle>) -> Option<Cell> {
         let intruders = self.intruders(true);

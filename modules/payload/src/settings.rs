@@ -1,7 +1,9 @@
 //! Speeds, times and distances of a robot's program.
 
-use rohrpost_team::RobotId;
 use rohrpost_team::coordination::TrafficSettings;
+use rohrpost_team::group::GroupSettings;
+use rohrpost_team::view::ViewSettings;
+use rohrpost_team::{RobotId, TeamSettings};
 use std::collections::BTreeSet;
 
 /// Fits cells of 1 m, a beat of 500 ms and these speeds.
@@ -14,6 +16,7 @@ const TRAFFIC: TrafficSettings = TrafficSettings {
     claim_ns: 3_000_000_000,
     stall_ns: 5_000_000_000,
     agree_ns: 3_000_000_000,
+    extend_ns: 2_000_000_000,
     looks_max: 2000,
 };
 
@@ -55,6 +58,8 @@ pub struct Settings {
     pub coordination: Option<TrafficSettings>,
     /// Stations that this robot obeys.
     pub stations: BTreeSet<RobotId>,
+    /// Whether this is a station: it obeys none.
+    pub is_station: bool,
 }
 
 impl Default for Settings {
@@ -72,6 +77,7 @@ impl Default for Settings {
             search_steps: 4,
             coordination: Some(TRAFFIC),
             stations: BTreeSet::new(),
+            is_station: false,
         }
     }
 }
@@ -106,6 +112,23 @@ pub enum RefusedSettings {
 }
 
 impl Settings {
+    /// Distances and ages of a team of such robots. `beat_ns`: from one hello to the next; `max_age_ns`: with a hello
+    /// that is older, a robot is silent.
+    pub fn team(&self, beat_ns: u64, max_age_ns: u64) -> TeamSettings {
+        const S_NS: u64 = 1_000_000_000;
+        let view = ViewSettings {
+            gate_mm: (self.gate_m * 1000.0) as u64,
+            sightings: 5,
+            certainty_max_age_ns: 10 * S_NS,
+            intruder_max_age_ns: 120 * S_NS,
+            friend_max_age_ns: 30 * S_NS,
+            friend_radius_mm: 450,
+            speed_max_mm_s: 600,
+        };
+        let group = GroupSettings { beat_ns, max_age_ns };
+        TeamSettings { group, view, drift_ppb: 60_000, clock_off_ns: 60 * S_NS }
+    }
+
     /// Checks all.
     ///
     /// # Errors

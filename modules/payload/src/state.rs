@@ -3,11 +3,12 @@
 use crate::ground::Ground;
 use crate::journey::Navigation;
 use crate::mode::Mode;
+use crate::request::{Report, RequestId};
 use crate::settings::Settings;
 use rohrpost_modules::types::{LaserScan, Pose};
 use rohrpost_robot::lookout::Lookout;
 use rohrpost_supervision::Command;
-use rohrpost_team::coordination::Traffic;
+use rohrpost_team::coordination::{NoWays, Traffic};
 use rohrpost_team::grid::Cell;
 use rohrpost_team::view::Object;
 use rohrpost_team::{Position, RobotId, Team};
@@ -41,16 +42,18 @@ pub enum News {
     Found(Cell),
     /// From now on it does this.
     Mode(Mode),
+    /// The robot has no way to where it should be.
+    NoWay(NoWays),
     /// A station has told it to end.
     Quit(RobotId),
     /// A robot that is no station of this team asked for something.
     Refused(RobotId),
-    /// A mobile has answered.
+    /// A mobile has answered, or has something to say.
     Report {
         /// The mobile.
         from: RobotId,
-        /// What a person reads.
-        text: String,
+        /// What it says.
+        report: Report,
     },
 }
 
@@ -86,6 +89,8 @@ pub(crate) struct State {
     pub(crate) fix: Option<Fix>,
     pub(crate) seen: Option<Seen>,
     pub(crate) lost: Option<LostCause>,
+    /// Why it has no way, as was told.
+    pub(crate) no_way: Option<NoWays>,
     pub(crate) mode: Mode,
     /// Something is near, in front of the robot.
     pub(crate) is_obstructed: bool,
@@ -93,7 +98,10 @@ pub(crate) struct State {
     pub(crate) outbox: Vec<Vec<u8>>,
     pub(crate) command: Option<Command>,
     pub(crate) news: Vec<News>,
-    pub(crate) has_quit: bool,
+    /// The last request that was refused: it is told once.
+    pub(crate) refused: Option<RequestId>,
+    /// A station has told it to end, after so many beats.
+    pub(crate) quit_beats: Option<u8>,
 }
 
 impl State {

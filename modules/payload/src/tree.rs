@@ -108,7 +108,7 @@ fn coordinate(plan: &mut Plan<State, Event>, types: Types) {
 
 fn control(plan: &mut Plan<State, Event>, types: Types) {
     let parent = [plan.group("remote-control", &[ROOT])];
-    let flow = Flow { consumes: &[types.command], sends: &[types.request], ..Flow::default() };
+    let flow = Flow { consumes: &[types.command], sends: &[types.request, types.report], ..Flow::default() };
     plan.leaf("command-sender", &parent, flow, move |_, event, turn| remote::command(event, turn, types));
     let flow = Flow { consumes: &[types.request], sends: &[types.report], ..Flow::default() };
     plan.leaf("remote-control-leaf", &parent, flow, move |state, event, turn| {

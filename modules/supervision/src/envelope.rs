@@ -22,7 +22,7 @@
 
 use crate::limits::Limits;
 use crate::sector::{Direction, Sector};
-use crate::way::{Heading, Way};
+use crate::way::{Course, Heading, Way};
 use crate::{Command, Motion, Scan};
 use core::f64::consts::{PI, TAU};
 use libm::{ceil, copysign, fabs, sqrt};
@@ -92,6 +92,8 @@ impl Verdict {
 const CREEP_M_S: f64 = 0.005;
 /// Directions without a beam are looked at so close together.
 const UNSEEN_STEP_RAD: f64 = PI / 90.0;
+/// Beams that are looked at together: where all of them see far, none is turned into a point.
+const GROUP: usize = 8;
 /// More than rounding takes from a reach, in metres and as a part of it.
 const ENOUGH: f64 = 1e-9;
 
@@ -100,6 +102,8 @@ const ENOUGH: f64 = 1e-9;
 pub struct Envelope {
     limits: Limits,
     mounting: Mounting,
+    /// From the robot's centre to its scanner, metres.
+    mounted_m: f64,
 }
 
 /// The way that a scan leaves in one direction of driving.
@@ -120,7 +124,8 @@ impl Room {
 impl Envelope {
     /// Of a robot with its scanner.
     pub fn new(limits: Limits, mounting: Mounting) -> Self {
-        Self { limits, mounting }
+        let Mounting { x_m, y_m, .. } = mounting;
+        Self { limits, mounting, mounted_m: sqrt(x_m * x_m + y_m * y_m) }
     }
 
     /// The robot and its times.
@@ -139,10 +144,11 @@ impl Envelope {
         let wanted = self.limits.cut(command);
         let mut speed_m_s = fabs(wanted.speed_m_s);
         let mut why = Why::Limit;
+        let course = Course::of(&self.limits, now_ns, scan.taken_ns, motion);
         for heading in [Heading::Forward, Heading::Backward] {
             // A robot that still rolls the other way, or rolls out, does so in the new turn.
             let asked_m_s = heading.of(wanted.speed_m_s);
-            let way = Way::of(&self.limits, now_ns, wanted, heading, scan.taken_ns, motion);
+            let way = Way::of(&self.limits, &course, wanted, heading);
             if asked_m_s == 0.0 && way.is_none() {
                 continue;
             }
@@ -163,36 +169,56 @@ impl Envelope {
 
     /// The least reach that any point of the scan, or any direction without one, allows; `enough_m` if they allow more.
     fn room(&self, scan: &Scan<'_>, sector: &Sector, others_m: f64, enough_m: f64) -> Room {
-        let Limits { radius_m, margin_m, .. } = self.limits;
-        let ring_m = radius_m + margin_m;
+        let ring_m = self.limits.radius_m + self.limits.margin_m;
         let mut room = Room { reach_m: enough_m, why: Why::Seen };
         let turn = Direction::of(scan.step_rad);
-        let mut beam = Direction::of(self.mounting.heading_rad + scan.start_rad);
-        let at = |room: &mut Room, beam: Direction, range_m: f64, radius_m: f64| {
+        let mut turns = [Direction::of(0.0); GROUP];
+        (1..GROUP).for_each(|beam| turns[beam] = turns[beam - 1].turned(turn));
+        let mut first = Direction::of(self.mounting.heading_rad + scan.start_rad);
+        for (group, ranges_m) in scan.ranges_m.chunks(GROUP).enumerate() {
+            // As seen from the scanner: what is further away touches the disc at no smaller reach, in no direction.
+            let touched_m = room.reach_m + ring_m + others_m + self.mounted_m;
+            let is_far = |range_m: &f32| f64::from(*range_m) >= touched_m;
+            if scan.range_max_m < touched_m || !ranges_m.iter().all(is_far) {
+                for (turned, number) in turns.iter().zip(group * GROUP..).take(ranges_m.len()) {
+                    self.look_along(&mut room, scan, number, first.turned(*turned), (sector, others_m));
+                }
+            }
+            first = first.turned(turns[GROUP - 1]).turned(turn);
+        }
+        self.between_last_and_first(scan, |direction| room.or(self.unseen_m(direction, sector, others_m), Why::Unseen));
+        room
+    }
+
+    /// Takes what one beam allows.
+    fn look_along(
+        &self,
+        room: &mut Room,
+        scan: &Scan<'_>,
+        number: usize,
+        beam: Direction,
+        (sector, others_m): (&Sector, f64),
+    ) {
+        let range_m = scan.ranges_m[number];
+        if !Scan::is_reading(range_m) {
+            return room.or(self.unseen_m(beam, sector, others_m), Why::Unseen);
+        }
+        let mut at = |range_m: f64, radius_m: f64| {
             let (x_m, y_m) = (self.mounting.x_m + range_m * beam.x, self.mounting.y_m + range_m * beam.y);
-            // What is further away touches the disc at no smaller reach, in no direction.
             let touched_m = room.reach_m + radius_m;
             if x_m * x_m + y_m * y_m < touched_m * touched_m {
                 room.or(sector.contact_m(x_m, y_m, radius_m), Why::Seen);
             }
         };
-        for (number, range_m) in scan.ranges_m.iter().enumerate() {
-            if Scan::is_reading(*range_m) {
-                // Nothing came back: what is further than that is not known.
-                let range_m = f64::from(*range_m).min(scan.range_max_m);
-                let moving_m = scan.moving_m.get(number).map_or(range_m, |moving_m| range_m.max((*moving_m).into()));
-                at(&mut room, beam, moving_m, ring_m + others_m);
-                // What stands still, nearer than what moves.
-                if moving_m > range_m {
-                    at(&mut room, beam, range_m, ring_m);
-                }
-            } else {
-                room.or(self.unseen_m(beam, sector, others_m), Why::Unseen);
-            }
-            beam = beam.turned(turn);
+        let ring_m = self.limits.radius_m + self.limits.margin_m;
+        // Nothing came back: what is further than that is not known.
+        let range_m = f64::from(range_m).min(scan.range_max_m);
+        let moving_m = scan.moving_m.get(number).map_or(range_m, |moving_m| range_m.max((*moving_m).into()));
+        at(moving_m, ring_m + others_m);
+        // What stands still, nearer than what moves.
+        if moving_m > range_m {
+            at(range_m, ring_m);
         }
-        self.between_last_and_first(scan, |direction| room.or(self.unseen_m(direction, sector, others_m), Why::Unseen));
-        room
     }
 
     /// Each direction outside of the scanner's fan.

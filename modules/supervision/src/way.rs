@@ -25,6 +25,24 @@ impl Heading {
     }
 }
 
+/// How the robot may move by the commands before.
+pub(crate) struct Course {
+    /// Age of the scan.
+    age_s: f64,
+    /// From the scan on.
+    since: Bounds,
+    /// When the motor obeys the command that is checked.
+    then: Bounds,
+}
+
+impl Course {
+    pub(crate) fn of(limits: &Limits, now_ns: u64, scan_ns: u64, motion: &Motion) -> Self {
+        let age_s = now_ns.saturating_sub(scan_ns) as f64 * 1e-9;
+        let obeyed_at_ns = now_ns.saturating_add((limits.lag_s * 1e9) as u64);
+        Self { age_s, since: motion.from(scan_ns), then: motion.at(obeyed_at_ns) }
+    }
+}
+
 /// How the robot may move one way, from the scan until it stands.
 pub(crate) struct Way {
     /// Way by the commands before, until the motor obeys this one.
@@ -40,18 +58,9 @@ pub(crate) struct Way {
 }
 
 impl Way {
-    pub(crate) fn of(
-        limits: &Limits,
-        now_ns: u64,
-        command: Command,
-        heading: Heading,
-        scan_ns: u64,
-        motion: &Motion,
-    ) -> Self {
+    pub(crate) fn of(limits: &Limits, course: &Course, command: Command, heading: Heading) -> Self {
         let Limits { lag_s, look_s, braking_m_s2, turn_braking_rad_s2, others_m_s, .. } = *limits;
-        let age_s = now_ns.saturating_sub(scan_ns) as f64 * 1e-9;
-        let obeyed_at_ns = now_ns.saturating_add((lag_s * 1e9) as u64);
-        let (since, then) = (motion.from(scan_ns), motion.at(obeyed_at_ns));
+        let Course { age_s, since, then } = *course;
         let all = since.with(Bounds::of(command));
         // The next look's own command is obeyed a lag later, as this one is.
         let held_s = look_s + lag_s;

@@ -158,6 +158,12 @@ impl Team {
         self.view.add_fake(now_ns, position)
     }
 
+    /// A station moves an intruder that it has made up. False if it has none of this id.
+    pub fn move_fake(&mut self, now_ns: u64, id: ObjectId, position: Position) -> bool {
+        let now_ns = self.pass(now_ns);
+        self.view.move_fake(now_ns, id, position)
+    }
+
     /// A station ends an intruder that it has made up. False if it has none of this id.
     pub fn end_fake(&mut self, now_ns: u64, id: ObjectId) -> bool {
         let now_ns = self.pass(now_ns);

@@ -35,6 +35,7 @@ mod sessions;
 mod split;
 mod streams;
 mod team_datagrams;
+mod team_traffic;
 mod teams;
 
 /// One target.
@@ -47,7 +48,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 26] = [
+pub const TARGETS: [Target; 27] = [
     Target { name: "head", run: head::run },
     Target { name: "names", run: names::run },
     Target { name: "config", run: config::run },
@@ -72,6 +73,7 @@ pub const TARGETS: [Target; 26] = [
     Target { name: "team-hellos", run: teams::run_hellos },
     Target { name: "team-records", run: teams::run_records },
     Target { name: "team-events", run: teams::run_events },
+    Target { name: "team-traffic", run: team_traffic::run },
     Target { name: "team-datagrams", run: team_datagrams::run },
     Target { name: "team-hosts", run: team_datagrams::run_hosts },
 ];

@@ -12,6 +12,7 @@ use rohrpost_routers::session::{Cause, EndHost};
 use rohrpost_routers::team::{
     MEMBERS_MAX, TEAM_BODY_BYTES_MAX, TeamHead, TeamHost, TeamKind, TeamRouter, TeamSettings,
 };
+use std::collections::BTreeSet;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroU8;
 
@@ -101,8 +102,17 @@ fn with_head(kind: u8, bytes: &mut Bytes<'_>, text: &[u8]) -> Vec<u8> {
     datagram
 }
 
-/// A file of hosts: what is read is of other systems, in order, and not too much.
+/// A file of hosts, in both forms: what is read is of other systems, in order, and not too much; ids and addresses of a
+/// team's hosts file are of one host each, and each mistake has a place.
 pub(crate) fn run_hosts(data: &[u8]) {
+    match rohrpost_config::roster(data, OWN) {
+        Ok(hosts) => {
+            let ids: BTreeSet<u8> = hosts.iter().map(|host| host.id).collect();
+            let addresses: BTreeSet<SocketAddr> = hosts.iter().map(|host| host.address).collect();
+            assert!(ids.contains(&OWN) && ids.len() == hosts.len() && addresses.len() == hosts.len());
+        }
+        Err(mistakes) => assert!(mistakes.iter().all(|it| it.line > 0 && it.column > 0) && !mistakes.is_empty()),
+    }
     let Ok(text) = std::str::from_utf8(data) else { return };
     match rohrpost_config::hosts(text, OWN, 21_121) {
         Ok(peers) => {

@@ -54,9 +54,13 @@ impl Floor {
     }
 }
 
-/// A map of our own format, with cells of 1 m.
-pub fn draw(chance: &mut Chance) -> String {
-    let (columns, rows) = (chance.between(4, 9) as usize * 2 + 1, chance.between(3, 7) as usize * 2 + 1);
+/// Side of the largest maps of a usual draw, in pairs of cells.
+pub const USUAL: u64 = 9;
+
+/// A map of our own format, with cells of 1 m, and `most` pairs of cells wide at most.
+pub fn draw(chance: &mut Chance, most: u64) -> String {
+    let (columns, rows) = (chance.between(most / 2, most), chance.between(most / 3, most - 2));
+    let (columns, rows) = (columns as usize * 2 + 1, rows as usize * 2 + 1);
     let mut floor = Floor::new(columns, rows);
     match chance.below(3) {
         0 => corridors(&mut floor, chance),

@@ -4,8 +4,6 @@ use rohrpost_payload::Settings;
 use rohrpost_robot::simulator::{Scanner, Settings as BodySettings};
 use rohrpost_supervision::Limits;
 use rohrpost_team::TeamSettings;
-use rohrpost_team::group::GroupSettings;
-use rohrpost_team::view::ViewSettings;
 use rohrpost_testbed::sim::link::Quality;
 use std::f64::consts::TAU;
 
@@ -27,17 +25,7 @@ pub const GOOD: Quality = Quality {
 
 /// Distances and ages of a team in this world.
 pub fn team_settings(settings: &Settings) -> TeamSettings {
-    let view = ViewSettings {
-        gate_mm: (settings.gate_m * 1000.0) as u64,
-        sightings: 5,
-        certainty_max_age_ns: 10 * S_NS,
-        intruder_max_age_ns: 120 * S_NS,
-        friend_max_age_ns: 30 * S_NS,
-        friend_radius_mm: 450,
-        speed_max_mm_s: 600,
-    };
-    let group = GroupSettings { beat_ns: BEAT_NS, max_age_ns: 15 * BEAT_NS / 2 };
-    TeamSettings { group, view, drift_ppb: 60_000, clock_off_ns: 60 * S_NS }
+    settings.team(BEAT_NS, 15 * BEAT_NS / 2)
 }
 
 /// A robot of 0.5 m across that sees all around.

@@ -8,10 +8,10 @@ use crate::standard::{BEAT_NS, GOOD, S_NS, body, limits, team_settings};
 use crate::watch::Watch;
 use rohrpost_arena::{Arena, ArenaSettings, Conduct};
 use rohrpost_modules::types::{Pose, Twist};
-use rohrpost_payload::{Ground, News, Payload, Request, Sensed, Settings};
+use rohrpost_payload::{Ground, News, Payload, Request, RequestId, RequestKind, Sensed, Settings};
 use rohrpost_supervision::{Change, Control};
-use rohrpost_team::RobotId;
 use rohrpost_team::grid::{Cell, Direction, Map};
+use rohrpost_team::{RobotId, Run};
 use rohrpost_testbed::sim::chance::Chance;
 use rohrpost_testbed::sim::clock::Clock;
 use rohrpost_testbed::sim::events::Events;
@@ -169,14 +169,18 @@ impl World {
         &self.mistakes
     }
 
-    /// A person at a robot or station asks something of all others. No effect without a payload.
-    pub fn ask(&mut self, id: RobotId, request: Request) {
+    /// A person at a robot asks something of all that it hears, once. No effect without a payload.
+    pub fn ask(&mut self, id: RobotId, kind: RequestKind) {
         let now_ns = self.now_ns;
         let robot = self.robot(id);
         let clock_ns = robot.clock_ns(now_ns);
-        if let Some(payload) = &mut robot.payload {
-            payload.ask(clock_ns, request);
-        }
+        let Some(payload) = &mut robot.payload else { return };
+        let group = payload.team().group();
+        let station = Run { robot: id, incarnation: group.version().incarnation };
+        let heard = group.heard(clock_ns).map(|(robot, heard)| (robot, heard.version.incarnation));
+        let to = heard.map(|(robot, incarnation)| Run { robot, incarnation }).collect();
+        let request_id = RequestId { station, number: (clock_ns / 1_000_000) as u32 };
+        payload.ask(clock_ns, Request { id: request_id, kind, to });
         self.serve(id);
     }
 

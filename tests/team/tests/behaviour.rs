@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
-use rohrpost_payload::{LostCause, Mode, News, Request, Settings};
+use rohrpost_payload::{LostCause, Mode, News, RequestKind, Settings};
 use rohrpost_team::RobotId;
 use rohrpost_team::grid::{Cell, Direction};
 use rohrpost_virtual_team::scene::{drawn, entrances_held};
@@ -74,11 +74,11 @@ fn a_station_gets_reports_and_ends_all_and_a_stranger_does_not() {
         world.add_robot(id(robot), Cell { column, row: 1 }, Direction::East);
     }
     world.run_s(3);
-    world.ask(id(9), Request::Info);
-    world.ask(id(3), Request::Quit);
+    world.ask(id(9), RequestKind::Info);
+    world.ask(id(3), RequestKind::Quit);
     world.run_s(1);
     let reports = world.news(id(9)).iter().filter_map(|(_, news)| match news {
-        News::Report { from, text } => Some((*from, text.starts_with("wandering at "))),
+        News::Report { from, report } => Some((*from, report.text.starts_with("wandering at "))),
         _ => None,
     });
     let mut reports: Vec<(RobotId, bool)> = reports.collect();
@@ -88,7 +88,7 @@ fn a_station_gets_reports_and_ends_all_and_a_stranger_does_not() {
         assert!(world.news(id(robot)).iter().any(|(_, news)| *news == News::Refused(id(3))), "robot {robot}");
         assert!(world.payload(id(robot)).is_some());
     }
-    world.ask(id(9), Request::Quit);
+    world.ask(id(9), RequestKind::Quit);
     world.run_s(5);
     for robot in [1, 3] {
         assert!(world.payload(id(robot)).is_none(), "robot {robot} has ended, and is not started again");

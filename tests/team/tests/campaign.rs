@@ -19,6 +19,8 @@ use rohrpost_virtual_team::world::World;
 use std::collections::BTreeSet;
 
 const SECONDS: u64 = 60;
+/// One of so many worlds is crowded.
+const CROWDED: u64 = 20;
 
 fn seeds() -> std::ops::Range<u64> {
     let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().unwrap());
@@ -26,10 +28,12 @@ fn seeds() -> std::ops::Range<u64> {
     first..first + number("ROHRPOST_TEAM_SEEDS").unwrap_or(20)
 }
 
-/// A world with 1 to 16 robots and up to two intruders, each in a cell of its own with room around.
+/// A world with up to two intruders and 1 to 16 robots, in one of twenty up to 64, each in a cell of its own with room
+/// around.
 fn world(seed: u64, acts_together: bool) -> World {
     let mut chance = Chance::new(seed);
-    let text = maps::draw(&mut chance);
+    let (robots, most) = if seed % CROWDED == 7 { (64, 2 * maps::USUAL) } else { (16, maps::USUAL) };
+    let text = maps::draw(&mut chance, most);
     let map = Map::read(text.as_bytes()).unwrap();
     let mut settings = Settings::default();
     settings.coordination = settings.coordination.filter(|_| acts_together);
@@ -41,9 +45,9 @@ fn world(seed: u64, acts_together: bool) -> World {
         free.retain(|other| !is_beside(*other, cell));
         Some(cell)
     };
-    for id in 1..=chance.between(1, 16) as u8 {
+    for id in 1..=chance.between(robots / 16, robots) as u8 {
         if let Some(cell) = take(&mut chance) {
-            world.add_robot(RobotId::new(id * 7).unwrap(), cell, chance.pick(&Direction::ALL));
+            world.add_robot(RobotId::new(id * 3).unwrap(), cell, chance.pick(&Direction::ALL));
         }
     }
     for _ in 0..chance.below(3) {

@@ -30,6 +30,7 @@ fn debian(profile: Profile, tree: &Tree, dist: &Path) -> Result<PathBuf, Failure
     let (staged, architecture) = (dist.join("work/debian"), output(Command::new("dpkg").arg("--print-architecture"))?);
     let (architecture, Glibc(major, minor)) = (architecture.trim(), needs::glibc(&tree.binaries)?);
     copy_tree(&tree.folder, &staged.join("usr"))?;
+    // Nobody reads mail for the project yet, and RFC 2606 gives `invalid` to nobody.
     let control = format!(
         "Package: rohrpost\nVersion: {VERSION}\nArchitecture: {architecture}\nSection: misc\nPriority: optional\n\
          Maintainer: The developers of Rohrpost <rohrpost@invalid>\nDepends: libc6 (>= {major}.{minor}), libgcc-s1\n\

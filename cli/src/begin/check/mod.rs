@@ -17,6 +17,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost check config/demo.toml
+  rohrpost check robot.toml --resolved     where each value comes from, of files that include others
   rohrpost check robot.toml --json         mistakes with file and line, or the resolved file, for programs")]
 pub(crate) struct Arguments {
     /// The configuration.
@@ -24,6 +25,9 @@ pub(crate) struct Arguments {
     /// Explain only this node.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
+    /// Print the whole text with what the file includes, and behind each value the file and line that it comes from.
+    #[arg(long, conflicts_with = "json")]
+    resolved: bool,
     /// Print mistakes, or what the file means, as JSON.
     #[arg(long)]
     json: bool,
@@ -44,7 +48,7 @@ pub(crate) fn load(file: &Path) -> Result<Installation, Errors> {
 pub(crate) fn validate(installation: Installation) -> Result<Installation, Errors> {
     let problems = rohrpost_builtin::check(&installation);
     if !problems.is_empty() {
-        return Err(Errors::new(&installation.path, problems));
+        return Err(installation.errors(problems));
     }
     let problems = rohrpost_builtin::check_saved(&installation);
     match &installation.saved {
@@ -61,6 +65,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         loaded => loaded?,
     };
+    if arguments.resolved {
+        say(installation.text.trim_end());
+        return Ok(ExitCode::SUCCESS);
+    }
     let only = arguments.node.as_deref();
     if only.is_some() {
         rohrpost_launch::choose_node(&installation, only)?;
@@ -104,7 +112,7 @@ fn separated_by_size(installation: &Installation) -> Vec<String> {
     let unsaid: Vec<&Flow> = installation.flows.iter().filter(|flow| flow.carries.is_none()).filter(crosses).collect();
     let mut lines: BTreeMap<(Name, Name), Vec<String>> = BTreeMap::new();
     for flow in unsaid {
-        lines.entry((flow.from, flow.to)).or_default().push(flow.line.to_string());
+        lines.entry((flow.from, flow.to)).or_default().push(installation.place(flow.line).1.to_string());
     }
     let notes = lines.into_iter().filter(|(_, lines)| lines.len() > 1).map(|((from, to), lines)| {
         format!(
@@ -128,9 +136,10 @@ fn missing_programs(installation: &Installation, only: Option<&str>) -> Result<V
 /// A file with mistakes.
 pub(super) fn errors_json(errors: &Errors) -> Value {
     let file = errors.path().display().to_string();
-    let problems = errors.problems().iter();
-    let problems: Vec<Value> =
-        problems.map(|problem| json!({ "file": file, "line": problem.line, "message": problem.message })).collect();
+    let mut problems = Vec::new();
+    for (path, line, message) in errors.placed() {
+        problems.push(json!({ "file": path.display().to_string(), "line": line, "message": message }));
+    }
     json!({ "file": file, "right": false, "errors": problems })
 }
 

@@ -15,7 +15,7 @@ use std::path::PathBuf;
   rohrpost demo --nodes 3 --tdma --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30 --kill-master
   rohrpost demo --nodes 3 --chaos 7 --seconds 60
-  rohrpost demo --team 6 --seconds 40
+  rohrpost demo --team 6 --seconds 60
 Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml, \
     config/demo-chaos.toml) \
     of the present folder if it exists, else its own copy.")]
@@ -56,10 +56,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SEED", requires_all = ["nodes", "seconds"], conflicts_with_all = ["tdma", "gui", "secure",
         "kill_master", "config", "record", "viewer"])]
     pub(super) chaos: Option<u64>,
-    /// Number of robots of a team, each a system of its own on a computer of its own. Their network is divided and
-    /// joined, and the computer of their leader killed; a table says after how many beats all agreed.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=20), conflicts_with_all = ["nodes",
-        "log", "config", "record", "viewer", "no_gui", "gui_build"])]
+    /// Number of robots of a team, each a system of its own on a computer of its own. They wander, find an intruder and
+    /// block it. Their network is divided and joined, a payload and the leader's computer are killed; a referee says
+    /// whether a robot touched anything, and a table after how many beats all agreed.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=60), conflicts_with_all = ["nodes",
+        "log", "config", "record", "viewer", "gui_build"])]
     pub(super) team: Option<u8>,
     /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that
     /// are reached only by TCP, a loss becomes a delay of that package and of all packages behind it.

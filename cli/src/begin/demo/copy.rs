@@ -7,7 +7,7 @@ use crate::begin::check;
 use crate::nodes::keys::certificates::{self, Renewal};
 use crate::terminal::Failure;
 use rohrpost_config::examples::{BUILDING, CHAOS, LOG, NODES, SIMULATION, TCP, TDMA};
-use rohrpost_config::{GUI, Installation, Keys, Program};
+use rohrpost_config::{GUI, Installation, Keys, Program, resolved_text};
 use rohrpost_routers::security::random;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};
@@ -48,7 +48,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     if there && arguments.log.is_none() && !is_changed {
         return Ok(check::load(&own)?);
     }
-    let text = if there { std::fs::read_to_string(&own)? } else { text.to_owned() };
+    let text = if there { resolved_text(&own)? } else { text.to_owned() };
     let shown = if there { own } else { format!("built-in {name}").into() };
     // The base of its relative paths; the built-in configuration's base is the folder of the copy.
     let folder = if there { Some(folder(&shown)?) } else { None };

@@ -5,6 +5,7 @@ mod name;
 use crate::terminal::{Failure, say};
 use name::ModuleName;
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -16,8 +17,8 @@ const INSTALLED: &str = "../share/rohrpost/src";
 /// A file of the project: its path, and its content with `{{…}}` for placeholders.
 type Template = (&'static str, &'static str);
 
-/// The files that all projects have.
-const COMMON: [Template; 3] = [
+/// The files that all projects in Rust have.
+const RUST: [Template; 3] = [
     ("Cargo.toml", include_str!("template/Cargo.toml.in")),
     (".gitignore", include_str!("template/gitignore.in")),
     ("src/main.rs", include_str!("template/main.rs.in")),
@@ -27,11 +28,22 @@ const COMMON: [Template; 3] = [
 struct Kind {
     /// What the project is, for the user.
     text: &'static str,
+    /// What makes it ready to be launched.
+    build: &'static str,
+    /// Its `program` in robot.toml.
+    program: &'static str,
+    /// One of its `settings` there.
+    setting: &'static str,
+    common: &'static [Template],
     files: [Template; 4],
 }
 
 const COUNTER: Kind = Kind {
     text: "a module that counts",
+    build: "cargo build && ",
+    program: "\"target/debug/{{name}}\"",
+    setting: "rate-hz = 10.0",
+    common: &RUST,
     files: [
         ("README.md", include_str!("template/README.md.in")),
         ("robot.toml", include_str!("template/robot.toml.in")),
@@ -48,18 +60,37 @@ const CAMERA: Kind = Kind {
         ("src/lib.rs", include_str!("template/camera/lib.rs.in")),
         ("tests/module.rs", include_str!("template/camera/module.rs.in")),
     ],
+    ..COUNTER
+};
+
+const PYTHON: Kind = Kind {
+    text: "a module in Python that counts",
+    build: "",
+    program: "\"./{{crate}}.py\"",
+    setting: "step = 1",
+    common: &[],
+    files: [
+        ("README.md", include_str!("template/python/README.md.in")),
+        ("robot.toml", include_str!("template/robot.toml.in")),
+        ("{{crate}}.py", include_str!("template/python/module.py.in")),
+        ("test_{{crate}}.py", include_str!("template/python/test.py.in")),
+    ],
 };
 
 #[derive(clap::Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   rohrpost new wind-vane
-  cd wind-vane && cargo build && rohrpost launch robot.toml")]
+  cd wind-vane && cargo build && rohrpost launch robot.toml
+  rohrpost new wind-vane --python      needs no build, and the package `rohrpost` for Python")]
 pub(crate) struct Arguments {
     /// The module's class, which names the project too: lower-case letters, digits and `-`.
     name: String,
     /// Begin with a camera: pictures of 1920 by 1080 pixels in a stream.
     #[arg(long)]
     camera: bool,
+    /// Write it in Python.
+    #[arg(long, conflicts_with_all = ["camera", "rohrpost"])]
+    python: bool,
     /// Folder of the project; default: NAME in the present folder.
     #[arg(long, value_name = "DIR")]
     path: Option<PathBuf>,
@@ -70,7 +101,14 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let name: ModuleName = arguments.name.parse()?;
-    let rohrpost = sources(arguments.rohrpost.as_deref())?;
+    let kind = if arguments.python {
+        PYTHON
+    } else if arguments.camera {
+        CAMERA
+    } else {
+        COUNTER
+    };
+    let rohrpost = if arguments.python { String::new() } else { sources(arguments.rohrpost.as_deref())? };
     let folder = arguments.path.clone().unwrap_or_else(|| name.as_str().into());
     // Existing files are never overwritten.
     match fs::read_dir(&folder).map(|mut entries| entries.next().is_none()) {
@@ -81,13 +119,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
         Err(error) => return Err(format!("{}: {error}; name another folder with --path DIR", folder.display()).into()),
     }
-    let kind = if arguments.camera { CAMERA } else { COUNTER };
-    for (file, template) in COMMON.iter().chain(&kind.files) {
-        write(&folder.join(file), &fill(template, &name, &rohrpost))?;
+    let fill = |text: &str| fill(text, &kind, &name, &rohrpost);
+    for (file, template) in kind.common.iter().chain(&kind.files) {
+        write(&folder.join(fill(file)), &fill(template))?;
     }
-    let (shown, text) = (folder.display(), kind.text);
+    let (shown, text, build) = (folder.display(), kind.text, kind.build);
     say(format_args!(
-        "made {shown}: {text}, its test, and a configuration\n\n  cd {shown}\n  cargo build && rohrpost launch \
+        "made {shown}: {text}, its test, and a configuration\n\n  cd {shown}\n  {build}rohrpost launch \
          robot.toml\n\n\
          README.md there says how to go on."
     ));
@@ -99,10 +137,15 @@ fn write(file: &Path, text: &str) -> Result<(), Failure> {
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder).map_err(failed)?;
     }
-    Ok(fs::write(file, text).map_err(failed)?)
+    fs::write(file, text).map_err(failed)?;
+    if text.starts_with("#!") {
+        fs::set_permissions(file, fs::Permissions::from_mode(0o755)).map_err(failed)?;
+    }
+    Ok(())
 }
 
-fn fill(template: &str, name: &ModuleName, rohrpost: &str) -> String {
+fn fill(template: &str, kind: &Kind, name: &ModuleName, rohrpost: &str) -> String {
+    let template = template.replace("{{program}}", kind.program).replace("{{setting}}", kind.setting);
     let filled = template.replace("{{name}}", name.as_str()).replace("{{crate}}", &name.crate_name());
     filled.replace("{{Type}}", &name.type_name()).replace("{{rohrpost}}", rohrpost)
 }
@@ -136,10 +179,12 @@ mod tests {
     #[test]
     fn the_template_has_no_placeholders_left_and_a_valid_configuration() {
         let name: ModuleName = "wind-vane".parse().unwrap();
-        for (file, template) in COMMON.into_iter().chain(COUNTER.files).chain(CAMERA.files) {
-            let text = fill(template, &name, "/opt/rohrpost");
+        let kinds = [COUNTER, CAMERA, PYTHON];
+        let files = kinds.iter().flat_map(|kind| kind.common.iter().chain(&kind.files).map(move |file| (kind, file)));
+        for (kind, (file, template)) in files {
+            let text = fill(template, kind, &name, "/opt/rohrpost");
             assert!(!text.contains("{{"), "{file}: {text}");
-            if file == "robot.toml" {
+            if *file == "robot.toml" {
                 let installation = rohrpost_config::Installation::parse(&text, Path::new(file)).unwrap();
                 assert_eq!(installation.modules.len(), 2);
             }

@@ -213,13 +213,6 @@ impl Names<'_> {
         self.running.text(name)
     }
 
-    /// Whether this is a mailbox for output lines. In any other module a mailbox of that local id has the module's own
-    /// data.
-    fn is_collector(&self, mailbox: Name) -> bool {
-        let class = self.running.installation.classes.id(rohrpost::output::CLASS);
-        class == Some(mailbox.class()) && mailbox.local() == rohrpost::output::LINES
-    }
-
     /// A stream by its name, or by its number.
     fn stream(&mut self, id: StreamId) -> String {
         let ask = |module| self.running.describe(module).ok();
@@ -229,7 +222,7 @@ impl Names<'_> {
 
     fn what(&mut self, flow: &FlowInfo) -> (Carries, String) {
         let kind = flow.kind.kind();
-        if matches!(kind, Kind::Data(_)) && self.is_collector(flow.to) {
+        if matches!(kind, Kind::Data(_)) && self.running.is_collector(flow.to) {
             return (Carries::Output, "lines".into());
         }
         let ask = |module| self.running.describe(module).ok();

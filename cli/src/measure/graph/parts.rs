@@ -1,6 +1,7 @@
 //! The parts of a graph: modules, and edges with their content; and the graph for Graphviz.
 
 use crate::look::observer::Silence;
+use crate::terminal::units::per_second;
 use rohrpost::output::plain;
 use rohrpost_launch::survey::Standing;
 use serde::Serialize;
@@ -100,11 +101,7 @@ impl Edge {
     }
 
     pub(super) fn rate(&self) -> String {
-        match self.packages_per_s {
-            rate if rate < 0.95 => format!("{rate:.2}/s"),
-            rate if rate < 9.5 => format!("{rate:.1}/s"),
-            rate => format!("{rate:.0}/s"),
-        }
+        per_second(self.packages_per_s)
     }
 }
 

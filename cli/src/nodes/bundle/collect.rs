@@ -28,8 +28,8 @@ struct Collector<'i> {
     notes: Vec<String>,
 }
 
-/// Collects the configuration, the parameters saved beside it, its programs, the files that its settings name, the
-/// hosts of its team, and `with`: files, and folders with all in them.
+/// Collects the configuration with what it includes, the parameters saved beside it, its programs, the files that its
+/// settings name, the hosts of its team, and `with`: files, and folders with all in them.
 ///
 /// # Errors
 /// A file that is not there or is secret, and paths of the configuration that a bundle cannot have.
@@ -40,6 +40,7 @@ pub(super) fn collect(installation: &Installation, with: &[PathBuf]) -> Result<C
     let mut collector = Collector { installation, folder, files: BTreeSet::new(), notes: Vec::new() };
     let configuration = lexical(&std::path::absolute(&installation.path)?);
     collector.files.insert(configuration.clone());
+    installation.included().try_for_each(|file| collector.included(&file))?;
     let saved = installation.parameters.as_ref();
     let saved = saved.filter(|saved| saved.starts_with(&installation.folder) && saved.is_file());
     saved.into_iter().try_for_each(|saved| collector.add(saved))?;
@@ -88,6 +89,16 @@ fn team_keys(installation: &Installation) -> Option<&PathBuf> {
 }
 
 impl Collector<'_> {
+    /// A file that the configuration includes.
+    fn included(&mut self, file: &Path) -> Result<(), Failure> {
+        if file.starts_with(&self.installation.folder) {
+            return self.add(file);
+        }
+        let file = file.display();
+        self.notes.push(format!("`{file}` is included by an absolute path, so each node must have it itself"));
+        Ok(())
+    }
+
     /// The program of a module, and files that its arguments and settings name.
     fn module(&mut self, module: &Module) -> Result<(), Failure> {
         let name = self.installation.classes.format(module.name);

@@ -34,6 +34,7 @@ pub(super) struct App {
 pub(super) enum Screen {
     Table,
     Details(Name),
+    Map,
     Help,
 }
 
@@ -144,7 +145,8 @@ impl App {
             (KeyCode::Char('?'), screen) => {
                 self.show(if screen == Screen::Help { Screen::Table } else { Screen::Help })
             }
-            (KeyCode::Esc | KeyCode::Backspace | KeyCode::Left, Screen::Details(_) | Screen::Help) => {
+            (KeyCode::Char('m'), screen) => self.show(if screen == Screen::Map { Screen::Table } else { Screen::Map }),
+            (KeyCode::Esc | KeyCode::Backspace | KeyCode::Left, Screen::Details(_) | Screen::Map | Screen::Help) => {
                 self.show(Screen::Table);
             }
             // From the table, Esc leads back to all modules.
@@ -163,7 +165,7 @@ impl App {
                 self.show(Screen::Details(name));
             }
             (key, Screen::Table) => self.table_key(key, model),
-            (key, Screen::Details(_) | Screen::Help) => self.scroll_by(key),
+            (key, Screen::Details(_) | Screen::Map | Screen::Help) => self.scroll_by(key),
         }
         None
     }

@@ -12,6 +12,7 @@
 
 use super::app::{App, Prompt, Screen};
 use super::columns::{Column, fit};
+use super::map::MapPage;
 use super::model::{Model, Row};
 use super::text::{head, help};
 use crate::terminal::wrap;
@@ -38,6 +39,8 @@ pub(super) struct ScreenModel<'a> {
     pub(super) silence: Option<&'a str>,
     /// Lines of the details, if they are shown; headings begin without a blank.
     pub(super) details: &'a [String],
+    /// The map, or why there is none.
+    pub(super) map: Result<&'a MapPage, &'a str>,
     pub(super) palette: Palette,
 }
 
@@ -64,6 +67,7 @@ impl ScreenModel<'_> {
                 self.table(&rows, table, to);
                 self.output(output, to);
             }
+            Screen::Map => self.map(middle, to),
             Screen::Details(_) | Screen::Help => {
                 let least = if middle.height >= SPLIT_MIN { OUTPUT_MIN } else { 0 };
                 let [text, output] = Layout::vertical([Constraint::Min(0), Constraint::Length(least)]).areas(middle);
@@ -76,6 +80,17 @@ impl ScreenModel<'_> {
             }
         }
         self.foot(foot, to);
+    }
+
+    fn map(&self, area: Rect, to: &mut Buffer) {
+        let [title, body] = Layout::vertical([Constraint::Length(1), Constraint::Min(0)]).areas(area);
+        match self.map {
+            Ok(page) => {
+                put(to, title, &page.title(), self.palette.rule());
+                page.draw(body, to, self.palette.colours);
+            }
+            Err(why) => put(to, title, why, self.palette.message()),
+        }
     }
 
     fn head(&self, area: Rect, to: &mut Buffer) {
@@ -162,6 +177,7 @@ impl ScreenModel<'_> {
                 "? help  q quit  o on  f off  Enter details  r restart  s sort  / filter  l lines  p pause"
             }
             Screen::Details(_) => "? help  q quit  Esc back  o on  f off  r restart  arrows scroll  l lines  p pause",
+            Screen::Map => "m, Esc back  q quit  ? help  p pause",
             Screen::Help => "Esc back  q quit  arrows scroll",
         };
         let (text, style) = match (&self.app.prompt, &self.app.message) {

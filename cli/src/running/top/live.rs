@@ -4,13 +4,14 @@ use super::app::{App, Screen, ScreenAction};
 use super::calls::{Answer, Calls};
 use super::details;
 use super::draw::{Palette, ScreenModel, columns};
+use super::map::{MapPage, MapReader};
 use super::model::{self, ErrorCauses, Model, NodeSurveys, Sample};
 use super::output::Output;
-use super::terminal::{RawTerminal, keyboard};
 use crate::look::control::supervisor;
 use crate::look::observer::Silence;
 use crate::look::target::Running;
 use crate::terminal::Failure;
+use crate::terminal::raw::{RawTerminal, keyboard};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyEventKind};
 use rohrpost::Name;
@@ -28,9 +29,10 @@ const LOOK: Duration = Duration::from_millis(100);
 const LOOK_WAITING: Duration = Duration::from_millis(10);
 
 /// Draws until the user or a signal ends it.
-pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Result<ExitCode, Failure> {
+pub(super) fn run(running: Running, interval: Duration, palette: Palette, first: Screen) -> Result<ExitCode, Failure> {
     let told = events()?;
     let mut live = Live::new(running, interval, palette)?;
+    live.app.screen = first;
     let outcome = {
         let mut screen = RawTerminal::new()?;
         let typed = keyboard()?;
@@ -76,6 +78,9 @@ struct Live {
     said: ErrorCauses,
     /// What a supervisor told last, for its page.
     control: Option<(Name, ControlState)>,
+    /// What the page *map* reads, or why it cannot, once it was shown.
+    map_reader: Option<Result<MapReader, String>>,
+    map: MapPage,
 }
 
 impl Live {
@@ -100,6 +105,8 @@ impl Live {
             output,
             said: ErrorCauses::default(),
             control: None,
+            map_reader: None,
+            map: MapPage::default(),
         };
         live.join();
         Ok(live)
@@ -139,20 +146,40 @@ impl Live {
                 self.look();
                 changed = true;
             }
+            changed |= self.read_map();
             changed |= self.answers();
         }
         Ok(())
     }
 
+    /// Takes what scanner and odometry say, while the map is shown; returns whether there is something to draw.
+    fn read_map(&mut self) -> bool {
+        if self.app.screen != Screen::Map || self.app.paused {
+            return false;
+        }
+        let Self { running, map_reader, map, .. } = self;
+        if let Ok(reader) = map_reader.get_or_insert_with(|| MapReader::open(running)) {
+            reader.read(map);
+        }
+        true
+    }
+
     /// Observes the node again; rates are relative to the previous observation.
     fn look(&mut self) {
+        let was_launched = self.now.launched;
         match self.sample(Some(&self.now)) {
             Ok(now) => self.earlier = Some(std::mem::replace(&mut self.now, now)),
             Err(_) => self.now.launched = false,
         }
+        if was_launched && !self.now.launched {
+            let node = &self.running.node_name;
+            self.app.message = Some(format!("the launch of node {node} has ended; what is shown is its last state"));
+        }
         if !self.now.launched {
             self.find_again();
         }
+        // Where nothing wrote scans yet, something may do so by now.
+        self.map_reader.take_if(|reader| reader.is_err());
         self.make_model();
         self.ask();
     }
@@ -195,6 +222,8 @@ impl Live {
         self.silent_since.clear();
         self.described.clear();
         self.calls = None;
+        (self.map_reader, self.map) = (None, MapPage::default());
+        self.app.message = Some("launched again".into());
         (self.running, self.now, self.earlier) = (running, now, None);
         self.said = ErrorCauses::default();
         self.output = Output::new(&self.running.installation);
@@ -320,7 +349,7 @@ impl Live {
                 let control = control.as_ref().filter(|(of, _)| shown == Some(*of)).map(|(_, state)| state);
                 details::page(&running.installation, now, model, name, (control, describe))
             }
-            Screen::Table | Screen::Help => Vec::new(),
+            Screen::Table | Screen::Map | Screen::Help => Vec::new(),
         };
         self.app.columns = columns(&self.model, terminal.size()?.width).into_iter().map(|(column, _)| column).collect();
         let output = self.output.shown(&self.running.installation, self.app.lines);
@@ -330,6 +359,10 @@ impl Live {
             output: &output,
             silence: self.output.silence.as_deref(),
             details: &details,
+            map: match &self.map_reader {
+                Some(Err(why)) => Err(why),
+                _ => Ok(&self.map),
+            },
             palette: self.palette,
         };
         terminal.draw(|frame| view.draw(frame.area(), frame.buffer_mut()))?;

@@ -14,9 +14,9 @@ mod columns;
 mod details;
 mod draw;
 mod live;
+mod map;
 mod model;
 mod output;
-mod terminal;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -34,6 +34,7 @@ use std::time::Duration;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost top                  ? shows the keys, q ends it
+  rohrpost top --map            the map: walls seen, the way, the scan; `m` there and back
   rohrpost top --once           one plain table
   rohrpost top --json           one object with everything, for programs
 Counters are read from shared memory, on other nodes through their launches: this disturbs nobody.")]
@@ -43,6 +44,9 @@ pub(crate) struct Arguments {
     /// Refresh period, seconds; rates are those of this time.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     interval: f64,
+    /// Begin with the map of a robot that writes streams of scans and odometry.
+    #[arg(long, conflicts_with_all = ["once", "json"])]
+    map: bool,
     /// Print the table once, after one interval.
     #[arg(long, conflicts_with = "json")]
     once: bool,
@@ -67,7 +71,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
             return Err("`top` draws on a terminal; for a file or pipe, use `top --once` or `top --json`".into());
         }
-        return live::run(running, interval, draw::Palette::new(arguments.no_color));
+        let first = if arguments.map { app::Screen::Map } else { app::Screen::Table };
+        return live::run(running, interval, draw::Palette::new(arguments.no_color), first);
     }
     let model = once(&running, interval)?;
     say(if arguments.json { serde_json::to_string(&model)? } else { text::table(&model) });

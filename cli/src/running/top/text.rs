@@ -51,12 +51,13 @@ pub(super) fn head(model: &Model) -> [String; 2] {
     [first.join("   "), second.join("   ")]
 }
 
-const KEYS: [(&str, &str); 12] = [
+const KEYS: [(&str, &str); 13] = [
     ("arrows, j k", "select a module; g and G the first and the last"),
     ("Enter", "details of the module; Esc goes back"),
     ("o", "switch it on"),
     ("f", "switch it off: its safe state"),
     ("r", "restart it, after y"),
+    ("m", "map: walls seen, the way, the scan; Esc goes back"),
     ("s", "sort by the next column, S the other way round"),
     ("/", "only modules with the typed text in their name; Esc: all"),
     ("l", "output of the selected module only, or of all"),

@@ -32,7 +32,7 @@ pub(crate) fn apart<A, T>(py: Python<'_>, argument: A, part: impl FnOnce(A) -> T
     result.into_inner()
 }
 
-fn timeout(timeout_s: f64) -> Duration {
+pub(crate) fn timeout(timeout_s: f64) -> Duration {
     Duration::try_from_secs_f64(timeout_s.max(0.0)).unwrap_or(Duration::MAX)
 }
 
@@ -103,7 +103,7 @@ pub(crate) fn get(py: Python<'_>, module: &str, interface: u32, number: u16, tim
     })
 }
 
-fn answer(py: Python<'_>, called: Result<Vec<u8>, CallError>) -> PyResult<Py<PyBytes>> {
+pub(crate) fn answer(py: Python<'_>, called: Result<Vec<u8>, CallError>) -> PyResult<Py<PyBytes>> {
     match called {
         Ok(bytes) => Ok(PyBytes::new(py, &bytes).unbind()),
         Err(error) => Err(call_failure(py, &error)),

@@ -2,7 +2,7 @@
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use rohrpost_native::{CallError, Fault, NativeError};
+use rohrpost_native::{CallError, Fault, NativeError, ToolError};
 
 /// An exception of `rohrpost.errors`.
 fn exception(py: Python<'_>, class: &str, text: &str) -> PyErr {
@@ -28,6 +28,19 @@ pub(crate) fn failure(py: Python<'_>, error: NativeError) -> PyErr {
         | NativeError::NoNumber(_)
         | NativeError::RecordOpen
         | NativeError::NoRecordOpen => misuse(py, &error.to_string()),
+    }
+}
+
+/// Why a program beside the robot cannot have something.
+pub(crate) fn tool_failure(py: Python<'_>, error: &ToolError) -> PyErr {
+    match error {
+        ToolError::Call(error) => call_failure(py, error),
+        ToolError::NotHere(_) => exception(py, "NoConnection", &error.to_string()),
+        ToolError::Configuration(_) => exception(py, "Misconfigured", &error.to_string()),
+        ToolError::Name(_) => exception(py, "Misuse", &error.to_string()),
+        ToolError::Join(_) | ToolError::Mailbox(_) | ToolError::Stream(_) => {
+            exception(py, "RohrpostError", &error.to_string())
+        }
     }
 }
 

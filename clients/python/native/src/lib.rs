@@ -20,6 +20,7 @@ mod records;
 mod seat;
 mod shared;
 mod streams;
+mod tool;
 mod values;
 mod watching;
 
@@ -44,6 +45,8 @@ mod _node {
     use crate::seat::Stream;
     #[pymodule_export]
     use crate::streams::open_stream;
+    #[pymodule_export]
+    use crate::tool::{CopiedStream, Tool};
     #[pymodule_export]
     use crate::watching::{unwatch, watch};
 }

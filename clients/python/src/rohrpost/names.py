@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -142,6 +143,16 @@ class Installation:
                 f"{path}: `[classes]` with an `id` each, and `[system]` with its `id`, are needed"
             ) from None
         return Installation.with_classes(own, classes, system_digest)
+
+    @staticmethod
+    def from_check(path: str | Path) -> Installation:
+        """From the file that ``rohrpost check FILE --json`` printed: system, classes and both digests."""
+        try:
+            its = json.loads(Path(path).read_text(encoding="utf-8"))["installation"]
+            classes = {str(entry["name"]): int(entry["id"]) for entry in its["classes"]}
+            return Installation.with_digests(int(its["system"]["id"]), its["digest"], classes)
+        except (KeyError, TypeError, json.JSONDecodeError):
+            raise ValueError(f"{path}: write into it what `rohrpost check robot.toml --json` prints") from None
 
     def name(self, text: str | Name) -> Name:
         """The module that a text names: ``motor.0``, ``2.motor.0.0``, ``200.0`` or ``2.200.0.0``."""

@@ -20,7 +20,7 @@ const MILLISECOND_NS: u64 = 1_000_000;
 
 /// What was told last, to tell what is news.
 #[derive(Default)]
-pub(super) struct TeamTold {
+pub(crate) struct TeamTold {
     /// Since when views differ, ns of the robot's clock.
     differs_since_ns: Option<u64>,
     fresh: BTreeSet<RobotId>,
@@ -64,7 +64,7 @@ impl TeamTold {
 }
 
 /// The team as a robot knows it now.
-pub(super) fn of(
+pub(crate) fn of(
     team: &Team,
     now_ns: u64,
     pose: Option<Pose>,
@@ -176,18 +176,18 @@ fn notice(notice: Notice) -> TeamNotice {
     TeamNotice { robot: robot.get(), kind }
 }
 
-pub(super) fn object_id(ObjectId { observer, number }: ObjectId) -> TeamObjectId {
+pub(crate) fn object_id(ObjectId { observer, number }: ObjectId) -> TeamObjectId {
     TeamObjectId { observer: observer.get(), incarnation: number.incarnation, number: number.counter }
 }
 
 /// `None` if its observer is no robot's number.
-pub(super) fn core_id(id: TeamObjectId) -> Option<ObjectId> {
+pub(crate) fn core_id(id: TeamObjectId) -> Option<ObjectId> {
     let number = Version { incarnation: id.incarnation, counter: id.number };
     RobotId::new(id.observer).map(|observer| ObjectId { observer, number })
 }
 
 /// A place in whole millimetres; `None` beyond 1000 km, and of what is no number.
-pub(super) fn position(x_m: f64, y_m: f64) -> Option<Position> {
+pub(crate) fn position(x_m: f64, y_m: f64) -> Option<Position> {
     let mm = |metres: f64| (metres.abs() <= 1e6).then(|| (metres * 1000.0).round() as i32);
     Some(Position { x_mm: mm(x_m)?, y_mm: mm(y_m)? })
 }

@@ -2,7 +2,6 @@
 //!
 //! A robot that has lost its note hears from teammates which incarnation it had, and goes above it.
 
-use super::settings::Settings;
 use rohrpost_mailbox::{Node, node_directory};
 use rohrpost_modules::runtime::Context;
 use std::fs::{self, File};
@@ -17,7 +16,7 @@ enum Place {
     File(PathBuf),
 }
 
-pub(super) struct Store {
+pub(crate) struct Store {
     place: Place,
     kept: Option<u32>,
     /// Whether it was told that nothing can be kept.
@@ -26,10 +25,10 @@ pub(super) struct Store {
 
 impl Store {
     /// The note, and the incarnation that begins now.
-    pub(super) fn open(settings: &Settings, context: &Context) -> (Self, u32) {
+    pub(crate) fn open(file: Option<&str>, context: &Context) -> (Self, u32) {
         let installation = context.installation();
         let name = installation.classes.format(context.me());
-        let place = match &settings.store {
+        let place = match file {
             Some(file) => Place::File(installation.resolve(file)),
             None => {
                 let on = installation.module(context.me()).map(|module| module.node.as_str()).unwrap_or_default();
@@ -53,7 +52,7 @@ impl Store {
     }
 
     /// Notes an incarnation, if it is another one.
-    pub(super) fn keep(&mut self, context: &Context, incarnation: u32) {
+    pub(crate) fn keep(&mut self, context: &Context, incarnation: u32) {
         if self.kept == Some(incarnation) {
             return;
         }

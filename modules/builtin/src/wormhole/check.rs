@@ -1,7 +1,7 @@
 //! What would keep a wormhole from its work, told before anything runs.
 
 use super::settings::Settings;
-use crate::map::read_map;
+use crate::map::read_walls;
 use crate::settings::has_class;
 use crate::sim;
 use rohrpost_config::{Document, Installation, Module, Problem, Program, TimeSource};
@@ -93,7 +93,9 @@ fn of_one(installation: &Installation, document: &Document<'_>, wormhole: &Modul
             tell(document.settings_line(wormhole, key), format!("`{name}` is on node {}, {text}", sensor.node));
         }
     }
-    if let Some(Err(error)) = settings.walls.as_ref().map(|known| read_map(&installation.resolve(&known.map))) {
+    if let Some(Err(error)) =
+        settings.walls.as_ref().map(|known| read_walls(&installation.resolve(&known.map), known.absolute))
+    {
         tell(document.settings_line(wormhole, "walls"), format!("its map cannot be used: {error}"));
     }
     let line = document.settings_line(wormhole, "program");

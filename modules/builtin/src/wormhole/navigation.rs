@@ -2,7 +2,7 @@
 //! destination when the program has missed a deadline, and it knows the walls of a map.
 
 use super::settings::Settings;
-use crate::map::read_map;
+use crate::map::read_walls;
 use rohrpost_modules::ModuleError;
 use rohrpost_modules::interfaces::{Destination, WheelsInterface};
 use rohrpost_modules::runtime::{Context, ModuleClock, Moment, Stream};
@@ -26,6 +26,8 @@ pub(super) struct Navigation {
 struct Map {
     world: World,
     walls: Walls,
+    /// Where the odometry begins.
+    start: Pose,
 }
 
 impl Navigation {
@@ -34,8 +36,8 @@ impl Navigation {
     pub(super) fn open(settings: &Settings, context: &mut Context) -> Result<Self, ModuleError> {
         let age_max_ns = settings.scan_age_max_ns();
         let map = settings.walls.as_ref().map(|known| {
-            let (world, _) = read_map(&context.path(&known.map))?;
-            Ok::<_, ModuleError>(Map { world, walls: settings.known_walls(known) })
+            let (world, start) = read_walls(&context.path(&known.map), known.absolute)?;
+            Ok::<_, ModuleError>(Map { world, walls: settings.known_walls(known), start })
         });
         let open = |odometry: &String| context.stream(WheelsInterface::ODOMETRY, odometry);
         let odometry = settings.odometry.as_ref().map(open).transpose()?;
@@ -55,9 +57,11 @@ impl Navigation {
         if !self.keeps_frame() {
             return Vec::new();
         }
-        let (Some(Map { world, walls }), Some(odometry)) = (&self.map, &mut self.odometry) else { return Vec::new() };
+        let (Some(Map { world, walls, start }), Some(odometry)) = (&self.map, &mut self.odometry) else {
+            return Vec::new();
+        };
         let Ok(Ok(Odometry { pose, .. })) = odometry.at(taken) else { return Vec::new() };
-        let Pose { x_m, y_m, heading_rad } = Pose::from(world.start().isometry() * pose.isometry());
+        let Pose { x_m, y_m, heading_rad } = Pose::from(start.isometry() * pose.isometry());
         // A robot in a wall is one of which the place is not known.
         if world.disc_is_blocked(x_m, y_m, 0.0) {
             return Vec::new();

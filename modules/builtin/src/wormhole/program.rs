@@ -82,7 +82,8 @@ impl Program {
     }
 }
 
-fn launch_of(node: &str, installation: &Installation, context: &Context) -> Option<LauncherProxy> {
+/// The launch of a node.
+pub(crate) fn launch_of(node: &str, installation: &Installation, context: &Context) -> Option<LauncherProxy> {
     let launcher = installation.launch_of(installation.node(node)?);
     Some(LauncherProxy::new(context.link(), launcher))
 }

@@ -89,6 +89,9 @@ pub(crate) struct Settings {
 pub(super) struct KnownWalls {
     /// A text map, see `robot::world`. The odometry begins where it marks the robot's start.
     pub(super) map: String,
+    /// Whether the odometry tells places on the map itself, as a localisation does; then the map marks no start.
+    #[serde(default)]
+    pub(super) absolute: bool,
     /// Map, pose and reading are together off by no more.
     pose_error_m: f64,
     pose_error_rad: f64,

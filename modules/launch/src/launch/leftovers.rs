@@ -5,6 +5,7 @@ use super::error::NotStarted;
 use rohrpost_config::{Installation, Module};
 use rohrpost_mailbox::{Node, NodeError, ParticipantInfo, ParticipantProcess, ProcessError};
 use rohrpost_modules::launch_support::environment;
+use rohrpost_modules::runtime::CONFIG_FILE;
 use std::os::unix::ffi::OsStrExt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,8 +15,6 @@ pub(super) const KILL_TIME: Duration = Duration::from_secs(5);
 /// Between two looks at what is still there.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// File in a node's directory that tells tools which configuration runs: its path, then the node's name.
-pub const CONFIG_FILE: &str = "config";
 /// What it resolved to, for programs: a file of the node's directory.
 const RESOLVED_FILE: &str = "node.json";
 

@@ -36,7 +36,6 @@ mod time;
 
 pub use error::{LaunchError, LeaseError, NotStarted};
 pub use events::{Event, events, stop_flag};
-pub use leftovers::CONFIG_FILE;
 pub use orphans::reap_orphans;
 pub use program::Permit;
 

@@ -137,6 +137,8 @@ const CLAIMED: &str = "cores::simulation::campaign::whatever_robots_plan_no_two_
 const MOVES: &str = "cores::simulation::blocking::an_intruder_that_moves_is_followed_and_nobody_changes_posts";
 const UNUSED: &str = "cores::simulation::scenes::a_claim_that_is_not_used_ends";
 const UNEQUAL: &str = "cores::simulation::scenes::robots_with_unequal_views_stand_until_they_are_equal";
+const HEAD_ON: &str = "cores::simulation::scenes::two_head_on_in_a_corridor_pass_each_other_at_the_next_place";
+const FRIENDS: &str = "cores::simulation::friends::a_friend_that_passes_is_no_intruder";
 const CLAIMS: &str = "coordination/traffic/claims.rs";
 
 const COORDINATION: &[Mistake] = &[
@@ -172,5 +174,23 @@ const COORDINATION: &[Mistake] = &[
         &[and_not("coordination/sharing.rs", "is_some_and(|steps| steps <= bound")],
         MOVES,
         "nobody changes posts",
+    ),
+    coordination(
+        "robots_swap_in_a_step_of_a_plan",
+        &[edit(
+            "coordination/planning/pibt.rs",
+            "if other == robot {
+                return false;",
+            "if other == robot {
+                return broken!(robots_swap_in_a_step_of_a_plan);",
+        )],
+        HEAD_ON,
+        "giving way begins within 10 s",
+    ),
+    coordination(
+        "friends_are_intruders",
+        &[and_not("view/look.rs", "filter(|friend| friend.can_be_at(obstacle, &self.settings)")],
+        FRIENDS,
+        "a friend that is heard is no intruder",
     ),
 ];

@@ -21,4 +21,4 @@ mod traffic;
 pub use planning::{DISTANCES_MAX, NoWays, Trip, Ways, plan_ways};
 pub use post::{OpenExit, Post, Target, WhyOpen};
 pub use sharing::{Duty, KEPT_STEPS, Participant, Sharing, WhyIdle, share_out};
-pub use traffic::{Claim, Stance, Traffic, TrafficMessage, TrafficSettings};
+pub use traffic::{Claim, Planner, Stance, Traffic, TrafficMessage, TrafficSettings};

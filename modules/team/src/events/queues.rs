@@ -62,6 +62,10 @@ impl<E> Rings<E> {
         self.rings[ring].events.pop_front().map(|(_, event)| event)
     }
 
+    fn waiting(&self, rings: &[usize]) -> usize {
+        rings.iter().map(|ring| self.rings[*ring].events.len()).sum()
+    }
+
     fn room(&self, rings: &[usize]) -> usize {
         rings.iter().map(|ring| self.rings[*ring].room).sum()
     }
@@ -72,6 +76,8 @@ pub(super) struct Queues<E> {
     rings: Rings<E>,
     /// Rings of each class, by [`Priority::ALL`].
     classes: [Vec<usize>; 3],
+    /// Most events of each class that waited at a time.
+    most: [usize; 3],
     turn: usize,
 }
 
@@ -85,12 +91,20 @@ impl<E> Queues<E> {
             let heard = types.len()..if class == Priority::Low { 2 * types.len() } else { types.len() };
             own.chain(heard).collect()
         };
-        Self { rings, classes: Priority::ALL.map(of), turn: 0 }
+        Self { rings, classes: Priority::ALL.map(of), most: [0; 3], turn: 0 }
     }
 
     pub(super) fn push(&mut self, event: Event<E>) -> bool {
         let heard = if event.from.is_some() { self.rings.rings.len() / 2 } else { 0 };
-        self.rings.push(heard + usize::from(event.event_type.0), event)
+        let is_taken = self.rings.push(heard + usize::from(event.event_type.0), event);
+        for (most, class) in self.most.iter_mut().zip(&self.classes) {
+            *most = self.rings.waiting(class).max(*most);
+        }
+        is_taken
+    }
+
+    pub(super) fn most(&self, class: Priority) -> usize {
+        self.most[class as usize]
     }
 
     pub(super) fn pop(&mut self) -> Option<Event<E>> {

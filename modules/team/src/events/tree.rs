@@ -293,6 +293,11 @@ impl<S, E> Tree<S, E> {
         self.core.losses.get(event_type, cause)
     }
 
+    /// How many events of a priority waited at a time at most.
+    pub fn queued_most(&self, priority: Priority) -> usize {
+        self.core.queues.most(priority)
+    }
+
     /// How many events of teammates were refused.
     pub fn refused(&self) -> u64 {
         self.refused

@@ -145,12 +145,21 @@ impl View {
         self.write(now_ns, None, Record { version, state, kind, position, may_be: None, names: Vec::new() })
     }
 
+    /// A station moves an intruder that it has made up. False if there is no such one of this station.
+    pub fn move_fake(&mut self, now_ns: u64, id: ObjectId, position: Position) -> bool {
+        self.change_fake(now_ns, id, |record| Record { position, ..record })
+    }
+
     /// A station ends an intruder that it has made up. False if there is no such one of this station.
     pub fn end_fake(&mut self, now_ns: u64, id: ObjectId) -> bool {
+        self.change_fake(now_ns, id, |record| Record { state: State::Gone, ..record })
+    }
+
+    fn change_fake(&mut self, now_ns: u64, id: ObjectId, change: impl FnOnce(Record) -> Record) -> bool {
         let own = self.ledgers.get(&self.me).filter(|_| id.observer == self.me);
         let fake = own.and_then(|own| own.records.get(&id.number)).map(|kept| kept.record.clone());
         let Some(record) = fake.filter(|record| record.kind == Kind::Fake && !record.is_ended()) else { return false };
-        self.write(now_ns, Some(id.number), Record { state: State::Gone, ..record });
+        self.write(now_ns, Some(id.number), change(record));
         true
     }
 

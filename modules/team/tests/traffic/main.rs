@@ -6,5 +6,6 @@
 
 mod blocking;
 mod campaign;
+mod friends;
 mod scenes;
 mod world;

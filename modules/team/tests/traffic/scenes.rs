@@ -2,7 +2,7 @@
 
 use crate::world::{MAP, S_NS, SETTINGS, World, cell, grid, id};
 use rohrpost_team::Version;
-use rohrpost_team::coordination::{Claim, NoWays, Stance, Target, Traffic, TrafficMessage};
+use rohrpost_team::coordination::{Claim, NoWays, Planner, Stance, Target, Traffic, TrafficMessage};
 use rohrpost_team::grid::Cell;
 use rohrpost_team::view::ObjectId;
 use std::collections::BTreeMap;
@@ -96,7 +96,7 @@ fn a_robot_that_is_pushed_or_lost_is_told_and_the_others_go_on() {
 /// A teammate that stands below the corridor claims its middle, again and again, and never goes.
 #[test]
 fn a_claim_that_is_not_used_ends() {
-    let grid = grid("...\n*.*\n");
+    let mut planner = Planner::new(grid("...\n*.*\n"));
     let mut traffic = Traffic::new(id(2), 1, MAP, SETTINGS, 0);
     traffic.set_place(Some(cell("0,0")));
     traffic.set_goal(Some(cell("2,0")));
@@ -105,7 +105,7 @@ fn a_claim_that_is_not_used_ends() {
     let (mut counter, mut place) = (0, cell("0,0"));
     for tick in 0..300 {
         let now_ns = tick * S_NS / 10;
-        if let Some(TrafficMessage { round, digest, claim: wanted, .. }) = traffic.poll(now_ns, &grid) {
+        if let Some(TrafficMessage { round, digest, claim: wanted, .. }) = traffic.poll(now_ns, &mut planner) {
             counter += 1;
             let (from, held, moment) = (id(1), vec![stance.cell], 0);
             let version = Version { incarnation: 1, counter };

@@ -1,7 +1,7 @@
 //! Bodies on a map, each with its core, and the radio between them.
 
 use rohrpost_team::RobotId;
-use rohrpost_team::coordination::{Target, Traffic, TrafficMessage, TrafficSettings};
+use rohrpost_team::coordination::{Planner, Target, Traffic, TrafficMessage, TrafficSettings};
 use rohrpost_team::grid::{Cell, Grid, Map};
 use rohrpost_testbed::sim::chance::Chance;
 use rohrpost_testbed::sim::events::Events;
@@ -22,6 +22,7 @@ pub(crate) const SETTINGS: TrafficSettings = TrafficSettings {
     claim_ns: 3 * S_NS,
     stall_ns: 5 * S_NS,
     agree_ns: 5 * S_NS,
+    extend_ns: S_NS,
     looks_max: 500,
 };
 
@@ -58,7 +59,7 @@ pub(crate) struct Body {
 }
 
 pub(crate) struct World {
-    pub(crate) grid: Grid,
+    planner: Planner,
     pub(crate) now_ns: u64,
     pub(crate) chance: Chance,
     pub(crate) bodies: BTreeMap<RobotId, Body>,
@@ -75,8 +76,8 @@ impl World {
     pub(crate) fn new(seed: u64, grid: Grid) -> Self {
         let (bodies, events) = (BTreeMap::new(), Events::default());
         let (faults, chance) = (Vec::new(), Chance::new(seed));
-        let settings = SETTINGS;
-        Self { grid, now_ns: 0, chance, bodies, loss_percent: 0, settings, moved_ns: 0, faults, events }
+        let (settings, planner) = (SETTINGS, Planner::new(grid));
+        Self { planner, now_ns: 0, chance, bodies, loss_percent: 0, settings, moved_ns: 0, faults, events }
     }
 
     pub(crate) fn add(&mut self, system: u8, at: Cell, goal: Option<Cell>) {
@@ -158,7 +159,7 @@ impl World {
 
     fn poll(&mut self, robot: RobotId) {
         let body = self.bodies.get_mut(&robot).unwrap();
-        let message = body.traffic.poll(self.now_ns, &self.grid);
+        let message = body.traffic.poll(self.now_ns, &mut self.planner);
         let goes_to = body.traffic.next_cell().filter(|_| body.going.is_none());
         if let Some(message) = message {
             self.send(robot, &message);

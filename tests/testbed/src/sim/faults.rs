@@ -3,7 +3,7 @@
 use super::chance::Chance;
 use super::clock::Now;
 use super::fault::Fault;
-use super::host::{DATA_MAILBOXES, TRANSIT_AGE_MAX_NS};
+use super::host::DATA_MAILBOXES;
 use super::package::Role;
 use super::packages::{ROUTER_CLASS, digest};
 use super::plan::{SYSTEM, fixed, incarnation};
@@ -219,9 +219,8 @@ impl World<'_> {
         self.trace.line(self.now_ns, || "all faults are over".into());
         let quality = fixed(self.plan.quality);
         self.links.iter_mut().flatten().for_each(|link| link.quality = quality);
-        // What waits in routers since the last flood is gone then.
-        let gone_ns = self.now_ns + TRANSIT_AGE_MAX_NS;
-        self.leases.as_mut().into_iter().for_each(|leases| leases.goes_wrong(gone_ns, 0));
+        let clear_ns = self.plan.clear_ns();
+        self.leases.as_mut().into_iter().for_each(|leases| leases.goes_wrong(clear_ns, 0));
     }
 
     fn split(&mut self, side: u64, change: impl Fn(&mut u32)) {

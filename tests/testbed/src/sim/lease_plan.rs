@@ -1,14 +1,10 @@
 //! The lease of a module with several nodes, as a plan has it.
 
 use super::host::TRANSIT_AGE_MAX_NS;
-use super::spans::MS;
 use rohrpost_mailbox::Name;
 use rohrpost_routers::moving::MovingNames;
 use rohrpost_supervision::lease::Terms;
 use std::sync::Arc;
-
-/// So long a question and its answer may wait in routers, besides their way, ns.
-const WAIT_NS: u64 = 150 * MS;
 
 /// The lease of a network's module.
 #[derive(Clone, Debug)]
@@ -27,8 +23,11 @@ pub(crate) struct LeasePlan {
     pub(crate) hearers: Vec<usize>,
     /// How much the clocks of the launches run fast, ns a second.
     pub(crate) rates_ppb: Vec<i64>,
-    /// The longest way of a package after the faults, and back, ns.
+    /// The longest way of a question after the faults, with that of its answer and the time that both wait in routers,
+    /// ns.
     pub(crate) way_ns: u64,
+    /// So long a router needs to join a network with time slots, ns; without them 0.
+    pub(crate) joins_ns: u64,
     /// What the router of each node knows of where it is.
     pub(crate) moving: Vec<Arc<MovingNames>>,
 }
@@ -48,7 +47,7 @@ impl LeasePlan {
     /// So long after the last fault somebody holds it, ns: a lease that nobody knows of, the time in which a better
     /// choice that has died is waited for, and questions.
     pub(crate) fn settling_ns(&self) -> u64 {
-        let settling_ns = 2 * self.terms.lease_ns() + 4 * (self.terms.ask_every_ns() + self.way_ns + WAIT_NS);
+        let settling_ns = 2 * self.terms.lease_ns() + 4 * (self.terms.ask_every_ns() + self.way_ns);
         settling_ns + settling_ns * 3 * u64::from(self.terms.rate_error_ppm()) / 1_000_000
     }
 

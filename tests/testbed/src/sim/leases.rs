@@ -131,7 +131,7 @@ impl Leases {
         (launch.fence, launch.look_ns, launch.seen) = (Fence::new(of_fence), now_ns, (None, 0));
         if is_witness {
             let opens_ns = launch.clock.when(now_ns + LEASE_MAX_NS, true_ns);
-            self.well_ns = self.well_ns.max(opens_ns);
+            self.well_ns = self.well_ns.max(opens_ns).max(true_ns + self.plan.joins_ns);
         }
         self.set_ready(true_ns, node);
         self.tell(true_ns, node);

@@ -48,10 +48,7 @@ impl Plan {
         let mut plan = Self::hard(seed).sealed();
         let mut chance = Chance::new(seed ^ 0x5e_1d);
         let joins_ns = plan.joins_ns();
-        plan.faults.clear();
-        plan.flows.retain(|flow| flow.burst == 1);
-        plan.quality = super::plan::fixed(plan.quality);
-        plan.checksum = true;
+        plan.calm_down();
         for node in 0..plan.nodes.len() {
             let from_ns = joins_ns * (1 + node as u64) + S + chance.below(S);
             let until_ns = from_ns + chance.scale(5 * MS, S / 4);

@@ -103,6 +103,7 @@ impl Robot {
             output: &self.output(app),
             silence: None,
             details: &details,
+            map: Err("no map"),
             palette: Palette { colours: false },
         };
         terminal.draw(|frame| view.draw(frame.area(), frame.buffer_mut())).unwrap();

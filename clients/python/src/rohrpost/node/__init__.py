@@ -29,10 +29,10 @@ _runs = False
 
 def is_available() -> bool:
     """Whether this package has its part in Rust, and that loads, so that modules run on the node."""
-    return _missing() is None
+    return missing() is None
 
 
-def _missing() -> str | None:
+def missing() -> str | None:
     """Why there are no modules on the node."""
     try:
         importlib.import_module("rohrpost._node")
@@ -52,9 +52,9 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
     Launch tells it by its environment what it is; by hand say ``--config FILE --name CLASS.INSTANCE``, or give it as
     ``arguments``. Raises :class:`rohrpost.Misuse` where it cannot run at all.
     """
-    missing = _missing()
-    if missing is not None:
-        raise Misuse(missing)
+    why = missing()
+    if why is not None:
+        raise Misuse(why)
     if threading.current_thread() is not threading.main_thread():
         raise Misuse("`rohrpost.run` is for the main thread: it takes the signals that end a module")
     global _runs
@@ -69,7 +69,7 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
 
     bridge = Bridge(module)
     _runs = True
-    os.register_at_fork(after_in_child=_forked)
+    hear_forks()
     # Its runtime goes to the safe state at these, and ends then. Python's own would raise in the middle of that. Under
     # `nohup` SIGHUP stays ignored.
     for ends in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -84,6 +84,17 @@ def run(module: type[Module], arguments: list[str] | None = None) -> NoReturn:
         _runs = False
         hear(False)
     sys.exit(code)
+
+
+_hears_forks = False
+
+
+def hear_forks() -> None:
+    """From now on a forked child has no part in what this process has on the node."""
+    global _hears_forks
+    if not _hears_forks:
+        os.register_at_fork(after_in_child=_forked)
+        _hears_forks = True
 
 
 def _forked() -> None:

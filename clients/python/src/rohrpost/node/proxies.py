@@ -6,14 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 from .. import _node
-from ..errors import BadReply, CallFault, FunctionError
+from ..errors import BadReply, CallFault
 from ..faults import INTERFACE_DIFFERS
 from ..names import Name
-from ..remote.calling import Prepared, function_of, prepare, prepare_get
-from ..schema.decode import decode
+from ..remote.calling import Prepared, function_of, prepare, prepare_get, value_of
 from ..schema.description import Description
-from ..schema.errors import SchemaError, WalkError
-from ..schema.text import is_result
+from ..schema.errors import SchemaError
 from ..schema.tree import U16
 from ..schema.decode import decode_front
 
@@ -62,7 +60,7 @@ class NodeProxy:
                 self._known = None
                 _node.forget(self._module)
                 continue
-            return self._value(prepared, answer)
+            return value_of(prepared, self._described()[0], answer)
 
     def _described(self) -> tuple[Name, Description]:
         if self._known is None:
@@ -72,15 +70,3 @@ class NodeProxy:
             except SchemaError as error:
                 raise BadReply(Name(raw), str(error)) from None
         return self._known
-
-    def _value(self, prepared: Prepared, answer: bytes) -> Any:
-        to = self._described()[0]
-        try:
-            value = decode(prepared.result, answer)
-        except WalkError as error:
-            raise BadReply(to, str(error)) from None
-        if not is_result(prepared.result):
-            return value
-        if value.name == "Err":
-            raise FunctionError(value.value, to)
-        return value.value

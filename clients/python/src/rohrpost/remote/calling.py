@@ -87,15 +87,19 @@ STATUS = prepare_common(wire.STATUS, b"", type_of_class(Status))
 
 def result(prepared: Prepared, call: Call) -> Any:
     """The result. Raises what went wrong, and :class:`FunctionError` for the function's own error."""
-    data = call.outcome()
+    return value_of(prepared, call.to, call.outcome())
+
+
+def value_of(prepared: Prepared, to: Name, answer: bytes) -> Any:
+    """What an answer says. Raises :class:`FunctionError` for the function's own error."""
     try:
-        value = decode(prepared.result, data)
+        value = decode(prepared.result, answer)
     except WalkError as error:
-        raise BadReply(call.to, str(error)) from None
+        raise BadReply(to, str(error)) from None
     if not is_result(prepared.result):
         return value
     if value.name == "Err":
-        raise FunctionError(value.value, call.to)
+        raise FunctionError(value.value, to)
     return value.value
 
 

@@ -19,7 +19,7 @@ from .streams import Wanted
 class Functions:
     """The functions of a module as methods, by its own description."""
 
-    def __init__(self, client: Any, endpoint: Endpoint, to: Name, timeout_s: float) -> None:
+    def __init__(self, client: Any, endpoint: Endpoint | None, to: Name, timeout_s: float) -> None:
         self._client, self._endpoint, self._to, self._timeout_s = client, endpoint, to, timeout_s
 
     def __getattr__(self, function: str) -> Callable[..., Any]:

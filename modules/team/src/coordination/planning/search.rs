@@ -17,6 +17,9 @@ use std::cmp::Reverse;
 use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
 
+/// For more robots the first solution counts: to go on searching shortens it less than to refine it.
+const IMPROVED_ROBOTS_MAX: usize = 8;
+
 /// How a search ends.
 pub(super) enum Found {
     /// The paths of all robots at each moment, and whether none cost less.
@@ -87,6 +90,9 @@ impl<'a> Search<'a> {
             if *here.paths == *self.goals {
                 // The way that a search found first ends here; cheaper ones end here, too.
                 self.goal = Some(top);
+                if self.goals.len() > IMPROVED_ROBOTS_MAX {
+                    break;
+                }
             }
             if self.goal.is_some_and(|goal| here.cost + here.rest >= self.configurations[goal as usize].cost) {
                 self.open.pop();

@@ -21,6 +21,9 @@ use crate::grid::Cell;
 use crate::ids::RobotId;
 use std::collections::BTreeMap;
 
+/// Robots that are nearer to a claimed cell are asked each time; others only when they were not heard for a while.
+const NEAR_STEPS: u64 = 4;
+
 /// What was heard of a robot last.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 struct Heard {
@@ -180,12 +183,21 @@ impl Claims {
         self.entering = None;
     }
 
+    /// Whether a robot is so near to this one that it asks it for an echo also when it has just heard of it.
+    pub(super) fn is_near(&self, robot: RobotId) -> bool {
+        let claimed = self.others.get(&robot).and_then(|heard| heard.message.claim);
+        let is_near = |claim: Claim| self.held().iter().any(|held| distance(*held, claim.cell) <= NEAR_STEPS);
+        claimed.is_some_and(is_near)
+    }
+
     /// Whether a robot may be in a cell by now, or beside it with a claim: as far as it drives since its last message.
     fn can_reach(&self, now_ns: u64, heard: &Heard, cell: Cell) -> bool {
         let age_ns = now_ns.saturating_sub(heard.heard_ns).saturating_add(self.settings.delay_max_ns);
         let steps = 2 + age_ns / self.settings.step_min_ns.max(1);
-        let distance =
-            |held: &Cell| u64::from(held.column.abs_diff(cell.column)) + u64::from(held.row.abs_diff(cell.row));
-        heard.message.held.iter().any(|held| distance(held) <= steps)
+        heard.message.held.iter().any(|held| distance(*held, cell) <= steps)
     }
+}
+
+fn distance(one: Cell, other: Cell) -> u64 {
+    u64::from(one.column.abs_diff(other.column)) + u64::from(one.row.abs_diff(other.row))
 }

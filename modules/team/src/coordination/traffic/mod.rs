@@ -1,7 +1,7 @@
 //! How robots go to their places without touching each other: one core on each robot, and messages to all.
 //!
 //! ```text
-//!  place, goal, intruders ──▶ Rounds: stand, agree, share out, plan ──▶ next cell of the plan
+//!  place, goal, intruders ──▶ Rounds: agree, share out, plan ─────────▶ next cell of the plan
 //!                                                                             │
 //!  TrafficMessage ◀── poll ◀── Claims: claim it, wait for all echoes ◀────────┘ ──▶ `next_cell`: go
 //! ```
@@ -11,20 +11,23 @@
 
 mod claims;
 mod message;
+mod planner;
 mod rounds;
 mod settings;
 
 pub use message::{Claim, Stance, TrafficMessage};
+pub use planner::Planner;
 pub use settings::TrafficSettings;
 
 use super::planning::NoWays;
 use super::post::{Post, Target};
 use super::sharing::{Duty, Sharing};
-use crate::grid::{Cell, Grid};
+use crate::grid::Cell;
 use crate::ids::{RobotId, Version};
 use claims::Claims;
 use rounds::{Known, RoundPlan};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// A robot among others on a map. Times are ns of its own clock.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -60,9 +63,10 @@ pub struct Traffic {
 /// A plan, and what it was made from.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Agreed {
+    since_ns: u64,
     known: Known,
     digest: u64,
-    plan: RoundPlan,
+    plan: Arc<RoundPlan>,
 }
 
 impl Traffic {
@@ -130,6 +134,11 @@ impl Traffic {
         self.claims.entering().filter(|_| !self.stands_still())
     }
 
+    /// Cells to which the robot goes by the plan, the next one first; empty without a plan.
+    pub fn way(&self) -> Vec<Cell> {
+        self.plan.as_ref().map(|agreed| agreed.plan.way(self.me, self.moment)).unwrap_or_default()
+    }
+
     /// What the robot has to do about intruders, and what the others do; `None` without one, or without a plan.
     pub fn sharing(&self) -> Option<&Sharing> {
         self.plan.as_ref().and_then(|agreed| agreed.plan.sharing.as_ref())
@@ -138,6 +147,19 @@ impl Traffic {
     /// Robots that cannot get where they should, and why.
     pub fn given_up(&self) -> &[(RobotId, NoWays)] {
         self.plan.as_ref().map_or(&[], |agreed| &agreed.plan.given_up)
+    }
+
+    /// Cells of robots that are heard, and where they go.
+    pub fn others(&self, now_ns: u64) -> impl Iterator<Item = Cell> {
+        let placed = self.claims.placed(now_ns).map(|(_, message)| message);
+        placed.flat_map(|message| message.held.iter().copied().chain(message.stance.and_then(|it| it.goal)))
+    }
+
+    /// Steps that the robot still has to go, as planned; `None` without a plan, or while it asks for another goal.
+    pub fn steps_left(&self) -> Option<usize> {
+        let agreed = self.plan.as_ref()?;
+        let goal = agreed.known.stances.get(&self.me)?.goal;
+        (goal == self.goal).then(|| agreed.plan.steps_left(self.me, self.moment))
     }
 
     /// How often the robot was in a cell that it had no right to enter: something moved it.
@@ -168,16 +190,12 @@ impl Traffic {
 
     /// Goes on, and says what has to be sent to all now, if anything has to. Call it after what it is told, and often
     /// enough that beats are sent.
-    pub fn poll(&mut self, now_ns: u64, grid: &Grid) -> Option<TrafficMessage> {
+    pub fn poll(&mut self, now_ns: u64, planner: &mut Planner) -> Option<TrafficMessage> {
         self.follow_round(now_ns);
-        self.agree(now_ns, grid);
+        self.agree(now_ns, planner);
         self.go_on(now_ns);
         let message = self.message(now_ns);
-        let is_news = self.sent.as_ref().is_none_or(|(sent, at_ns)| {
-            let as_sent = TrafficMessage { version: sent.version, ..message.clone() };
-            as_sent != *sent || now_ns.saturating_sub(*at_ns) >= self.settings.beat_ns
-        });
-        if !is_news {
+        if !self.is_news(now_ns, &message) {
             return None;
         }
         self.version = self.version.next();
@@ -186,11 +204,27 @@ impl Traffic {
         Some(message)
     }
 
+    /// Whether a message has to go at once. Echoes for robots that do not wait for them go with the next one.
+    fn is_news(&self, now_ns: u64, message: &TrafficMessage) -> bool {
+        let Some((sent, at_ns)) = &self.sent else { return true };
+        let (version, echoes) = (sent.version, sent.echoes.clone());
+        let is_waited_for =
+            |(robot, number): (&RobotId, &u32)| sent.echoes.get(robot) != Some(number) && self.claims.is_near(*robot);
+        TrafficMessage { version, echoes, ..message.clone() } != *sent
+            || message.echoes.iter().any(is_waited_for)
+            || now_ns.saturating_sub(*at_ns) >= self.settings.beat_ns
+    }
+
+    /// Whether all that are heard take part in this round: before that, nobody knows what all plan from.
+    fn all_take_part(&self, now_ns: u64) -> bool {
+        self.claims.placed(now_ns).all(|(_, message)| message.round == self.round)
+    }
+
     fn stands_still(&self) -> bool {
         self.is_frozen || self.is_lost
     }
 
-    /// Begins a round, or goes over to that of another robot, once the robot stands.
+    /// Begins a round, or goes over to that of another robot. The step that has begun goes on.
     fn follow_round(&mut self, now_ns: u64) {
         let greatest = self.claims.placed(now_ns).map(|(_, message)| message.round).max().unwrap_or(0);
         let starts = self.is_new && now_ns >= self.claims.has_listened_ns();
@@ -199,51 +233,58 @@ impl Traffic {
             if starts || self.wants_round(now_ns) { self.round.max(greatest).saturating_add(1) } else { greatest };
         if round > self.round {
             self.claims.want(now_ns, None);
-            if self.claims.entering().is_none() || self.stands_still() {
-                (self.round, self.stance, self.plan, self.moment) = (round, None, None, 0);
-            }
+            (self.round, self.stance, self.plan, self.moment, self.next_moment) = (round, None, None, 0, 0);
         }
-        if let (None, Some(cell)) = (self.stance, self.claims.here()) {
+        if let (None, Some(cell)) = (self.stance, self.stands_in()) {
             let stance = Stance { cell, goal: self.goal, post: self.post, is_frozen: self.stands_still() };
             self.stance = Some((stance, now_ns));
         }
     }
 
+    /// Where the robot is, once its step has ended.
+    fn stands_in(&self) -> Option<Cell> {
+        self.claims.entering().filter(|_| !self.stands_still()).or(self.claims.here())
+    }
+
     /// Whether this robot has a reason to plan anew: what it said in this round is no longer so.
     fn wants_round(&self, now_ns: u64) -> bool {
         let Some((stance, _)) = self.stance else { return false };
-        let has_changed =
-            stance.is_frozen != self.stands_still() || stance.goal != self.goal && self.intruders.is_empty();
-        let Some(agreed) = &self.plan else {
-            return has_changed || self.claims.here() != Some(stance.cell);
-        };
+        let has_stopped = stance.is_frozen != self.stands_still();
+        let Some(agreed) = &self.plan else { return has_stopped || self.stands_in() != Some(stance.cell) };
+        let is_first = agreed.known.intruders.is_empty() && !self.intruders.is_empty();
+        let is_other_goal = stance.goal != self.goal && self.intruders.is_empty();
+        let is_other = is_other_goal || agreed.known.intruders != self.intruders;
+        let is_time = is_first || now_ns.saturating_sub(agreed.since_ns) >= self.settings.extend_ns;
         let others = self.claims.placed(now_ns).map(|(robot, _)| robot);
         let is_other_team = !others.eq(agreed.known.stances.keys().copied().filter(|robot| *robot != self.me));
         let has_stalled = now_ns.saturating_sub(self.progress_ns) > self.settings.stall_ns;
-        let was_pushed = self.claims.here().is_some_and(|here| !agreed.plan.is_at(self.me, self.moment, here));
-        has_changed
+        let place = self.claims.here().filter(|_| self.claims.entering().is_none());
+        let was_pushed = place.is_some_and(|here| !agreed.plan.is_at(self.me, self.moment, here));
+        has_stopped
+            || (is_other || is_other_team) && is_time
             || was_pushed
-            || is_other_team
-            || agreed.known.intruders != self.intruders
             || has_stalled && agreed.plan.wants_more(self.me, self.moment)
     }
 
     /// Plans if all know the same, or do not come to for too long.
-    fn agree(&mut self, now_ns: u64, grid: &Grid) {
+    fn agree(&mut self, now_ns: u64, planner: &mut Planner) {
         let Some((stance, since_ns)) = self.stance.filter(|_| self.plan.is_none()) else { return };
+        let since_ns = since_ns.max(self.claims.has_listened_ns());
+        let is_late = now_ns > since_ns.saturating_add(self.settings.agree_ns);
+        if now_ns < self.claims.has_listened_ns() || !is_late && !self.all_take_part(now_ns) {
+            return;
+        }
         let known = self.known(now_ns, stance);
         let digest = known.digest();
         let mut others = self.claims.placed(now_ns).map(|(_, message)| message);
         let agrees = others.all(|message| message.round == self.round && message.digest == digest);
-        let since_ns = since_ns.max(self.claims.has_listened_ns());
-        let is_late = now_ns > since_ns.saturating_add(self.settings.agree_ns);
-        if now_ns >= self.claims.has_listened_ns() && (agrees || is_late) {
-            let plan = RoundPlan::new(grid, &known, self.settings.looks_max);
+        if agrees || is_late {
+            let plan = planner.plan(&known, self.settings.looks_max);
             self.post = plan.sharing.as_ref().and_then(|sharing| match sharing.duties.get(&self.me) {
                 Some(Duty::Hold { post, .. }) => Some(*post),
                 _ => None,
             });
-            self.plan = Some(Agreed { known, digest, plan });
+            self.plan = Some(Agreed { since_ns: now_ns, known, digest, plan });
             (self.moment, self.progress_ns) = (0, now_ns);
         }
     }
@@ -285,7 +326,8 @@ impl Traffic {
 
     fn message(&self, now_ns: u64) -> TrafficMessage {
         let stance = self.stance.map(|(stance, _)| stance);
-        let now_known = || stance.map_or(0, |stance| self.known(now_ns, stance).digest());
+        let takes_part = stance.filter(|_| self.plan.is_none() && self.all_take_part(now_ns));
+        let now_known = || takes_part.map_or(0, |stance| self.known(now_ns, stance).digest());
         TrafficMessage {
             from: self.me,
             version: self.version,

@@ -1,12 +1,15 @@
 //! Rounds of planning: robots stand, come to know the same, plan the same, and go.
 //!
 //! ```text
-//!  anything new ──▶ round + 1 ──▶ all finish their step and stand ──▶ stances ──▶ all digests equal ──▶ plan, go
+//!  anything new ──▶ round + 1 ──▶ all say where their step ends ──▶ stances ──▶ all digests equal ──▶ plan, go
 //! ```
 //!
 //! A round is started by any robot: for a new goal, a robot that came or went, a stall. The greatest number counts. A
 //! plan keeps an order: a robot enters a cell after those that have it earlier in the plan have left it. In a plan no
 //! circle of robots moves at once, so some robot can always go on.
+//!
+//! **Nobody stands for a round.** A robot that is on its way into a cell is there, as far as plans go: it has the cell
+//! for itself. While it drives, all agree; it begins no other step before that.
 
 use super::message::Stance;
 use crate::coordination::planning::{NoWays, Trip, plan_ways};
@@ -116,10 +119,28 @@ impl RoundPlan {
         self.robots.iter().enumerate().all(has_left).then_some((cell, next as u32))
     }
 
+    /// Cells to which a robot goes after a moment, the next one first.
+    pub(super) fn way(&self, me: RobotId, mut moment: u32) -> Vec<Cell> {
+        let Ok(at) = self.robots.binary_search(&me) else { return Vec::new() };
+        let steps = std::iter::from_fn(|| {
+            let (next, cell) = self.step_after(at, moment)?;
+            moment = next as u32;
+            Some(cell)
+        });
+        steps.collect()
+    }
+
     /// Whether the plan has a robot in this cell at a moment, if it has the robot at all.
     pub(super) fn is_at(&self, me: RobotId, moment: u32, cell: Cell) -> bool {
         let at = self.robots.binary_search(&me).ok();
         at.is_none_or(|at| self.moments.get(moment as usize).is_some_and(|cells| cells[at] == cell))
+    }
+
+    /// Steps that a robot still has to go.
+    pub(super) fn steps_left(&self, me: RobotId, moment: u32) -> usize {
+        let Ok(at) = self.robots.binary_search(&me) else { return 0 };
+        let rest = self.moments.get(moment as usize..).unwrap_or_default();
+        rest.windows(2).filter(|pair| pair[0][at] != pair[1][at]).count()
     }
 
     /// Whether a robot has not arrived yet, or another plan may give it more to do: it has no way to its goal, or it

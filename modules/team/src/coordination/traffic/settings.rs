@@ -20,6 +20,8 @@ pub struct TrafficSettings {
     /// Robots plan with what each knows if they do not come to know the same for so long: when some of them hear each
     /// other only through others.
     pub agree_ns: u64,
+    /// Robots ask for other goals no sooner after the last plan, so that goals of several robots come together.
+    pub extend_ns: u64,
     /// Looks of the search for ways, as in [`plan_ways`](crate::coordination::plan_ways).
     pub looks_max: u32,
 }

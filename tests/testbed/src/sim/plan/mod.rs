@@ -11,6 +11,7 @@ pub(super) use draw::{masters, node};
 
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
+use super::host::TRANSIT_AGE_MAX_NS;
 use super::lease_plan::LeasePlan;
 use super::link::Quality;
 use super::replicas::StreamPlan;
@@ -253,6 +254,12 @@ impl Plan {
         self.fixed_ns + RECOVERY_NS.max(leases_ns)
     }
 
+    /// When the last package that has waited since the faults is gone, and each node may send again, true ns.
+    pub(super) fn clear_ns(&self) -> u64 {
+        let joined_ns = self.slots.as_ref().map_or(0, |_| self.stepped_ns);
+        joined_ns.max(self.fixed_ns + TRANSIT_AGE_MAX_NS)
+    }
+
     /// Whether links lose, copy or reorder datagrams before all is fixed.
     pub(super) fn is_lossy(&self) -> bool {
         self.quality != fixed(self.quality)
@@ -329,11 +336,16 @@ impl Plan {
     /// A network in which nothing goes wrong.
     pub fn calm(seed: u64) -> Self {
         let mut plan = Self::small(seed);
-        plan.faults.clear();
-        plan.flows.retain(|flow| flow.burst == 1);
-        plan.quality = fixed(plan.quality);
-        plan.checksum = true;
+        plan.calm_down();
         plan
+    }
+
+    /// Nothing goes wrong any more.
+    pub(super) fn calm_down(&mut self) {
+        self.faults.clear();
+        self.flows.retain(|flow| flow.burst == 1);
+        self.quality = fixed(self.quality);
+        self.checksum = true;
     }
 }
 

@@ -89,14 +89,18 @@ impl Plan {
     /// has had it, and then all must be well.
     pub(in crate::sim) fn time_slots(&mut self) {
         self.time();
-        // A joining node hears some Syncs before it asks, and so long a master is given to answer.
-        let joins_ns = 2 * u64::from(JOINING_SYNCS) * self.shape.interval_ns + DEAF_NS;
-        let joins_ns =
-            joins_ns + if self.sealed { SEALED_JOINS_NS + SEALED_JOINS_CYCLES * self.shape.interval_ns } else { 0 };
+        let joins_ns = self.joining_ns();
         self.timed_ns += joins_ns;
         self.stepped_ns = self.timed_ns + EPOCH_PAUSE_NS + joins_ns;
         self.traffic_end_ns = self.stepped_ns + RECOVERY_NS + WELL_NS;
         self.end_ns = self.traffic_end_ns + DRAIN_NS;
+    }
+
+    /// Longest time from a router's start to its first datagram, ns: a joining node hears some Syncs before it asks,
+    /// and a master is given time to answer.
+    pub(in crate::sim) fn joining_ns(&self) -> u64 {
+        let joins_ns = 2 * u64::from(JOINING_SYNCS) * self.shape.interval_ns + DEAF_NS;
+        joins_ns + if self.sealed { SEALED_JOINS_NS + SEALED_JOINS_CYCLES * self.shape.interval_ns } else { 0 }
     }
 
     /// What seals takes its part of each slot; and a joining node must begin its peer sessions first.

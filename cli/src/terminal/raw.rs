@@ -9,10 +9,10 @@ use ratatui::crossterm::{cursor, execute};
 use std::sync::mpsc::Receiver;
 
 /// The terminal in raw mode; restored however the program ends.
-pub(super) struct RawTerminal(pub(super) DefaultTerminal);
+pub(crate) struct RawTerminal(pub(crate) DefaultTerminal);
 
 impl RawTerminal {
-    pub(super) fn new() -> Result<Self, Failure> {
+    pub(crate) fn new() -> Result<Self, Failure> {
         let hook = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
             // First, so that the panic's message is visible.
@@ -21,7 +21,7 @@ impl RawTerminal {
         }));
         Self::draw().map_err(|error| {
             give_back();
-            format!("cannot draw on this terminal: {error}; use `top --once`").into()
+            format!("cannot draw on this terminal: {error}").into()
         })
     }
 
@@ -46,7 +46,7 @@ fn give_back() {
 
 /// Terminal events from a separate thread: reading from a closed terminal never returns (crossterm takes
 /// its end for an interruption), and must not keep the program from ending.
-pub(super) fn keyboard() -> Result<Receiver<Event>, Failure> {
+pub(crate) fn keyboard() -> Result<Receiver<Event>, Failure> {
     let (sender, receiver) = std::sync::mpsc::channel();
     let read = move || {
         while let Ok(event) = event::read() {
