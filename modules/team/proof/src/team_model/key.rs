@@ -12,17 +12,18 @@
 //! - *Ages of records*: the model's objects do not age.
 //! - *The observer with which the last synchro ended*: the next one begins behind it, which counts only where a synchro
 //!   is cut; the model's have room for all.
-//!
-//! *Names.* Robots without records do the same whatever their ids are: nothing that one sends or decides follows from an
-//! order of ids, and the promises about them name no id. They begin alike. So states are alike in which robots have only
-//! changed places, and their key is the least of those of all [`NAMINGS`].
+//! - *Names*: robots without records do the same whatever their ids are: nothing that one sends or decides follows
+//!   from an order of ids, and the promises about them name no id. They begin alike. So states are alike in which
+//!   robots have only changed places, and their key is the least of those of all [`NAMINGS`].
 //!
 //! `walk.rs` tests that states of one key go on to states of one key, and that robots that have changed places go on as
 //! the others do.
 
 use super::super::{RobotId, Version};
-use super::world::ROBOTS;
 use std::hash::{DefaultHasher, Hash, Hasher};
+
+/// Robots of the model.
+pub(crate) const ROBOTS: usize = 3;
 
 /// Gaps between counters of one run that are told apart.
 const GAP_MAX: u32 = 5;

@@ -5,9 +5,9 @@ use super::super::group::Notice;
 use super::super::view::Record;
 use super::super::{RobotId, Team, Version};
 use super::bounds::{Bounds, Loss, Story};
-use super::key::id;
+use super::key::{ROBOTS, id};
 use super::team::{MAX_AGE_BEATS, Message, is_certain, knows_its_end};
-use super::world::{Action, ROBOTS, Robot, State, Step, Teams};
+use super::world::{Action, Robot, State, Step, Teams};
 use stateright::Property;
 use std::sync::Arc;
 

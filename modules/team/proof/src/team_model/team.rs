@@ -4,8 +4,8 @@ use super::super::group::{GroupSettings, Hello};
 use super::super::view::{Records, ViewSettings};
 use super::super::{Position, Team, TeamSettings};
 use super::bounds::{Bounds, Story};
-use super::key::id;
-use super::world::{BEAT_NS, ROBOTS, State};
+use super::key::{ROBOTS, id};
+use super::world::{BEAT_NS, State};
 
 /// ROBOT_MAX_AGE: a single lost hello is enough to be taken for dead.
 pub(crate) const MAX_AGE_BEATS: u64 = 1;

@@ -1,7 +1,7 @@
 //! Robots, what is on its way between them, and the steps of both.
 
 use super::bounds::{Bounds, Loss, Store, Story};
-use super::key::{Key, NAMINGS, Naming};
+use super::key::{Key, NAMINGS, Naming, ROBOTS};
 use stateright::{Model, Property};
 use std::collections::HashSet;
 use std::fmt::Debug;
@@ -10,9 +10,6 @@ use std::sync::Arc;
 
 /// From one beat to the next, ns.
 pub(crate) const BEAT_NS: u64 = 1_000_000_000;
-/// Robots of the model.
-pub(crate) const ROBOTS: usize = 3;
-
 /// Ends of rounds after a death that are counted.
 pub(crate) const DEAD_MAX: u8 = 4;
 
