@@ -7,7 +7,7 @@ use rohrpost_testbed::sim::plan::Plan;
 /// Networks without being asked for more.
 const SEEDS: u64 = 200;
 /// The same with time slots, which take longer.
-const SLOTTED_SEEDS: u64 = 100;
+const SLOTTED_SEEDS: u64 = 60;
 /// What must have been seen so often in each hundred networks.
 const SEEN_IN_A_HUNDRED: [(&str, u64); 7] = [
     ("leases given", 150),
