@@ -34,8 +34,10 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         }
         // Of a robot with a wormhole, see `supervised`.
         "halt" | "resume" => return None,
-        // Of several nodes, see `lan`; of several systems, see `beyond` and `team`.
-        "net" | "time" | "router" | "tcp-router" | "tcp-client" | "team-router" | "team" => return None,
+        // Of several nodes, see `lan`; of several systems, see `beyond`, `team` and `station`.
+        "net" | "time" | "router" | "tcp-router" | "tcp-client" | "team-router" | "team" | "wormhole" | "station" => {
+            return None;
+        }
         other => panic!("`{other}` is new: say here how it is tested"),
     };
     Some([&[command], after].concat())
@@ -208,17 +210,11 @@ fn tools_say_what_to_do_while_nothing_runs() {
     assert!(said.err.contains("--config FILE --name CLASS.INSTANCE"), "{said:?}");
     let said = place.say(&["run", "mop", "--config", config.to_str().unwrap(), "--name", "output.0"]);
     assert_eq!(said.code, Some(2), "{said:?}");
-    assert!(
-        said.err.contains("'mop'")
-            && said.err.contains("sim, carmen, mapper, pilot, mischief, wormhole, team, payload, arena, body, output"),
-        "{said:?}"
-    );
+    let builtins = "sim, carmen, mapper, pilot, mischief, wormhole, team, payload, station, arena, body, output";
+    assert!(said.err.contains("'mop'") && said.err.contains(builtins), "{said:?}");
     let help = place.say(&["run", "--help"]).ok();
     let words: Vec<&str> = help.split_whitespace().collect();
-    assert!(
-        words.join(" ").contains("sim, carmen, mapper, pilot, mischief, wormhole, team, payload, arena, body, output"),
-        "{help}"
-    );
+    assert!(words.join(" ").contains(builtins), "{help}");
     place.assert_empty();
 }
 
