@@ -5,6 +5,7 @@ use crate::event::Event;
 use crate::mode::Mode;
 use crate::state::{News, State};
 use rohrpost_modules::types::Pose;
+use rohrpost_team::RobotId;
 use rohrpost_team::coordination::{Duty, Target, Traffic};
 use rohrpost_team::grid::Cell;
 
@@ -44,7 +45,9 @@ pub(crate) fn coordinate(state: &mut State, now_ns: u64) {
     }
     state.navigation.next = if state.navigation.turns_back { None } else { traffic.next_cell() };
     let me = state.team.group().me();
-    let no_way = traffic.given_up().iter().find(|(robot, _)| *robot == me).map(|(_, why)| *why);
+    // A robot that is to end goes nowhere.
+    let is_meant = |robot: RobotId| robot == me && state.quit_beats.is_none();
+    let no_way = traffic.given_up().iter().find(|(robot, _)| is_meant(*robot)).map(|(_, why)| *why);
     if no_way != state.no_way {
         state.no_way = no_way;
         no_way.into_iter().for_each(|why| state.tell(News::NoWay(why)));
