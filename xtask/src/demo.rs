@@ -66,8 +66,13 @@ fn beside_its_map(demo: &mut Command, rohrpost: &Path) -> Result<ExitCode, Failu
     let log = cargo::target().join("demo.log");
     let told = |error: std::io::Error| format!("{}: {error}", log.display());
     let (out, err) = File::create(&log).and_then(|out| Ok((out.try_clone()?, out))).map_err(told)?;
-    // A group of its own: Ctrl-C on the terminal is for the map.
-    let mut running = demo.arg("--quiet").stdout(out).stderr(err).process_group(0).spawn().map_err(told)?;
+    // It ends if this process does, as by a terminal that is closed. A group of its own: Ctrl-C is for the map.
+    let mut held = Command::new("setpriv");
+    held.args(["--pdeathsig", "INT"]).arg(demo.get_program()).args(demo.get_args()).arg("--quiet");
+    held.envs(demo.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    let Ok(mut running) = held.stdout(out).stderr(err).process_group(0).spawn() else {
+        return become_it(demo);
+    };
     let began = Instant::now();
     let runs = |it: &mut Child| it.try_wait().is_ok_and(|ended| ended.is_none());
     let is_seen = || Command::new(rohrpost).args(["list", "-i", "demo"]).output().is_ok_and(|it| it.status.success());
