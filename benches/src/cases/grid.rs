@@ -24,7 +24,7 @@ pub fn all() -> Vec<Case> {
     ]
 }
 
-/// The same cells in each run, in no order.
+/// Cells in no order, equal in each run.
 fn is_one_of_five(cell: Cell) -> bool {
     let mixed = u64::from(cell.row * SIDE + cell.column).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32 < (1 << 32) / 5

@@ -93,7 +93,7 @@ struct Node {
     ended: Option<ExitStatus>,
     /// Stop signals that it was sent.
     told: usize,
-    /// Its end was wanted.
+    /// An end that was wanted.
     killed: bool,
 }
 
@@ -228,7 +228,7 @@ impl<'a> LaunchedNodes<'a> {
     /// The network between the nodes.
     ///
     /// # Errors
-    /// They share that of this computer.
+    /// Nodes share that of this computer.
     pub(crate) fn lab(&self) -> Result<&Lab, Failure> {
         self.lab.as_ref().ok_or_else(|| "the nodes have no network of their own".into())
     }

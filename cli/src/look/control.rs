@@ -55,7 +55,7 @@ pub(crate) fn control_table<'a>(told: impl Iterator<Item = (&'a str, &'a Control
     table(heads, rows)
 }
 
-/// The same of one supervisor, and what it refused: lines with a word in front.
+/// What one supervisor does, and what it refused: lines with a word in front.
 pub(crate) fn control_lines(state: &ControlState) -> Vec<(&'static str, String)> {
     let sees = if state.sees { "sees" } else { "does not see" };
     let mut lines = vec![

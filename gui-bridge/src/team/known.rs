@@ -38,9 +38,9 @@ struct Heard {
 pub(crate) enum Doing {
     Mode(PayloadMode),
     Lost,
-    /// Its program has missed a deadline, and the wormhole drives in its place.
+    /// The program has missed a deadline, and the wormhole drives in its place.
     WormholeDrives,
-    /// Its program does not drive, and nothing else does.
+    /// The program does not drive, and nothing else does.
     NobodyDrives,
     Silent,
 }
@@ -146,7 +146,7 @@ impl KnownRobot {
         ((truth.x_m - belief.x_m).hypot(truth.y_m - belief.y_m) > BELIEF_M).then_some(belief)
     }
 
-    /// Its group and leader: as it says itself, or as teammates that hear it say; none of a silent one.
+    /// Group and leader: as the robot says itself, or as teammates that hear it say; none of a silent one.
     pub(crate) fn group(&self, now_ns: u64) -> Option<(u8, u8)> {
         let own = self.team_now(now_ns).map(|team| (team.group, team.leader));
         own.or_else(|| self.heard_now(now_ns).map(|heard| (heard.group, heard.leader)))
@@ -157,7 +157,7 @@ impl KnownRobot {
         self.group(now_ns).map_or(palette::AID, |(group, _)| palette::series(group.into()))
     }
 
-    /// Its group in words, and their colour; none if nobody told of it ever.
+    /// The group in words, and their colour; none if nobody told of it ever.
     pub(crate) fn group_told(&self, now_ns: u64) -> Option<(String, Rgb)> {
         let Some((group, leader)) = self.group(now_ns) else {
             return self.silent_ns(now_ns).map(|_| (Doing::Silent.word().into(), Doing::Silent.colour()));

@@ -16,7 +16,7 @@ pub(crate) struct Look {
     pub(super) colour: Rgb,
     pub(super) doing: Option<Doing>,
     pub(super) is_leader: bool,
-    /// It believes to be elsewhere, and so is drawn there, too.
+    /// The robot believes to be elsewhere, and so is drawn there, too.
     pub(super) is_mistaken: bool,
     pub(super) label: String,
 }

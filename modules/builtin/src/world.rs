@@ -1,7 +1,7 @@
 //! `arena`: the process that moves all robots and intruders of a simulated team, and referees them. What it computes is
 //! in [`rohrpost_arena`]; here are its socket, its clock, and what it publishes.
 //!
-//! It belongs to no robot: nothing that becomes of their processes stops it. A robot without commands brakes.
+//! The arena belongs to no robot: nothing that becomes of their processes stops it. A robot without commands brakes.
 
 mod check;
 mod settings;

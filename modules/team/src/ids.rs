@@ -10,7 +10,7 @@ impl RobotId {
         if system == 0 || system == u8::MAX { None } else { Some(Self(system)) }
     }
 
-    /// Its system number.
+    /// The system number.
     pub const fn get(self) -> u8 {
         self.0
     }

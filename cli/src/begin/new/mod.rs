@@ -30,7 +30,7 @@ struct Kind {
     text: &'static str,
     /// What makes it ready to be launched.
     build: &'static str,
-    /// Its `program` in robot.toml.
+    /// What `program` of robot.toml is.
     program: &'static str,
     /// One of its `settings` there.
     setting: &'static str,

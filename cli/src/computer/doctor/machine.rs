@@ -67,7 +67,7 @@ impl Needs {
 /// A wormhole of the configuration, on this node.
 pub(super) struct Supervisor {
     pub(super) module: String,
-    /// Its SCHED_FIFO priority; none: the normal scheduler.
+    /// Priority under SCHED_FIFO; none: the normal scheduler.
     pub(super) fifo: Option<u8>,
     /// What it says, or why it does not; none while its node does not run.
     pub(super) says: Option<Result<ControlState, String>>,

@@ -49,9 +49,9 @@ pub(super) struct Robots {
 pub(super) struct Intruder {
     #[serde(deserialize_with = "cell")]
     pub(super) cell: Cell,
-    /// It flees from robots at this speed; without: it stands.
+    /// Flees from robots at this speed; without: it stands.
     flees_m_s: Option<f64>,
-    /// It stands while no robot is so near.
+    /// Stands while no robot is so near.
     #[serde(default = "fears_m")]
     fears_m: f64,
 }

@@ -21,7 +21,7 @@ pub enum Near {
 pub struct TooClose {
     /// Line of the path, from 1.
     pub line: usize,
-    /// Its column, from 1.
+    /// The column, from 1.
     pub column: usize,
     /// What it is too close to.
     pub near: Near,

@@ -29,7 +29,7 @@ const HAS_REFERENCE: u8 = 4;
 pub struct Hello {
     /// The sender.
     pub from: RobotId,
-    /// Its incarnation, and the counter that rises with each hello.
+    /// The incarnation, and the counter that rises with each hello.
     pub version: Version,
     /// Digest of the map on which its positions are.
     pub map: u64,
@@ -65,7 +65,7 @@ pub struct Pose {
 pub struct Reference {
     /// The robot that has this clock.
     pub robot: RobotId,
-    /// Its incarnation: a restarted robot may have another clock.
+    /// The incarnation: a restarted robot may have another clock.
     pub incarnation: u32,
     /// That clock minus the sender's, ns.
     pub offset_ns: i64,

@@ -67,9 +67,9 @@ pub struct Member {
     pub hops: u8,
     /// Whether it says that its view is that of all that it hears.
     pub agrees: bool,
-    /// Its newest hello that came without help.
+    /// The newest hello that came without help.
     pub direct: Option<Direct>,
-    /// Its last known place, and when that came, ns.
+    /// The last known place, and when that came, ns.
     pub last_pose: Option<(Pose, u64)>,
     /// Newest counter of an earlier incarnation that came late, and how many came in order.
     earlier: (Version, u8),

@@ -51,7 +51,7 @@ struct Sample {
 }
 
 impl Sample {
-    /// Its bound at a time: both clocks drift.
+    /// The bound at a time: both clocks drift.
     fn at(&self, now_ns: u64, drift_ppb: u32) -> Offset {
         let drift_ns = drift_ns(now_ns.saturating_sub(self.at_ns), drift_ppb);
         Offset { bound_ns: self.offset.bound_ns.saturating_add(drift_ns), ..self.offset }

@@ -60,7 +60,7 @@ impl World {
         self.events.push(self.now_ns + self.chance.below(BEAT_NS), Event::Beat(id, *run));
     }
 
-    /// It does not beat any more.
+    /// The robot does not beat any more.
     pub(crate) fn kill(&mut self, id: RobotId) {
         self.robots.remove(&id);
         self.radio.remove(id);

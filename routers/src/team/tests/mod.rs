@@ -18,7 +18,7 @@ const SECOND: u64 = 1000 * MS;
 #[derive(Default)]
 struct Node {
     delivered: Vec<(Head, Vec<u8>)>,
-    /// Its mailboxes refuse everything for this reason.
+    /// Mailboxes refuse everything for this reason.
     refuses: Option<NotDelivered>,
     /// Names that it does not host.
     lacks: Vec<Name>,
@@ -75,7 +75,7 @@ impl End {
         Self { router: TeamRouter::new(settings, true, 0), node: Node::default() }
     }
 
-    /// Its beat, if one is due.
+    /// The beat, if one is due.
     fn beat(&mut self, now_ns: u64) -> Option<Vec<u8>> {
         let mut datagram = Vec::new();
         self.router.poll(now_ns, &mut datagram).ok().map(|()| datagram)

@@ -92,7 +92,7 @@ impl Plan {
         Self::small(seed).with_leases()
     }
 
-    /// The same with time slots, in which a lease is counted in cycles.
+    /// A network with time slots, in which a lease is counted in cycles.
     pub fn leased_slotted(seed: u64) -> Self {
         Self::with_room(seed).with_leases()
     }
@@ -136,7 +136,7 @@ impl Plan {
         Self::calm(seed).with_deaths()
     }
 
-    /// The same with time slots, of computers that keep up.
+    /// A calm network with time slots, of computers that keep up.
     pub fn leased_slotted_calm(seed: u64) -> Self {
         let mut plan = Self::with_room(seed);
         plan.calm_down();

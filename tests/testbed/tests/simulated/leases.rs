@@ -6,7 +6,7 @@ use rohrpost_testbed::sim::plan::Plan;
 
 /// Networks without being asked for more.
 const SEEDS: u64 = 200;
-/// The same with time slots, which take longer.
+/// Networks with time slots, which take longer.
 const SLOTTED_SEEDS: u64 = 60;
 /// What must have been seen so often in each hundred networks.
 const SEEN_IN_A_HUNDRED: [(&str, u64); 7] = [
